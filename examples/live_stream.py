@@ -20,9 +20,9 @@ def main() -> None:
         state, update = method.step(state, time, points)
         if len(update.revised):
             print(f"{time:.2f} s: {len(update.revised)} earlier detections got their names")
-    live = state.live()
-    for identity, gap, mean in zip(live["ids"], live["gaps"], live["means"], strict=True):
-        x, y, z = mean[:, 0]
+    tracks = update.tracks
+    for identity, gap, place in zip(tracks.ids, tracks.gaps, tracks.positions, strict=True):
+        x, y, z = place
         occluded = f", not seen for {gap} frames" if gap else ""
         print(f"marker {identity} at ({x:.3f}, {y:.3f}, {z:.3f}) m{occluded}")
 

@@ -164,7 +164,8 @@ class _Tracker:
         confidence: Floats,
     ) -> None: ...
     def copy(self) -> Self: ...
-    def tracks(self) -> dict[str, NDArray[Any]]: ...
+    # (ids, frames since the last detection, log odds, means, covariances) of the confirmed tracks
+    def tracks(self) -> tuple[Ints, Ints, Floats, Floats, Floats]: ...
     has_confidence: Final[bool]
     n_frames: Final[int]
     n_seen: Final[int]
@@ -562,12 +563,10 @@ class LiveStitcher:
         revised: Ints,
         revised_labels: Ints,
     ) -> tuple[LiveStitcher, Ints, Ints, Ints]: ...
-    # The present marker of each label of the tracker, -1 for none.
-    def markers_of(self, labels: Ints) -> Ints: ...
-    # (markers not among the given ones, frames since their last detection, means, covariances)
-    def unseen(
-        self, markers: Ints, is_seen: NDArray[np.bool_], points: Floats
-    ) -> tuple[Ints, Ints, Floats, Floats]: ...
+    # As `tracks` of a tracker, of the markers, from that of the tracker of the labels.
+    def states(
+        self, labels: Ints, gaps: Ints, log_odds: Floats, means: Floats, covariances: Floats
+    ) -> tuple[Ints, Ints, Floats, Floats, Floats]: ...
     n_seen: Final[int]
     n_joins: Final[int]
     n_ghosts: Final[int]

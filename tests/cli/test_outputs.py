@@ -19,6 +19,8 @@ FILES = {
     "track -o": ("track in.csv -o OUT", ".csv"),
     "track --report": ("track in.csv -o new.csv --report OUT", ".html"),
     "track --run -o": ("track in.csv --run new -o OUT", ".csv"),
+    "live": ("live in.csv?speed=max --to OUT", ".csv"),
+    "live, C3D": ("live in.csv?speed=max --to OUT", ".c3d"),
     "edit": ("edit in.csv --script edits.toml -o OUT", ".csv"),
     "stitch": ("stitch truth.csv -o OUT", ".csv"),
     "fill": ("fill truth.csv -o OUT", ".csv"),
@@ -64,6 +66,7 @@ WORK = {
     "asterism": ("read", "read_rig", "track", "estimate_model"),
     "asterism.io": ("read_tracks", "read_observations"),
     "asterism.tracking": ("plan_tracking",),
+    "asterism.live": ("run",),
     "asterism.cli.outputs": ("read_labels", "read_model"),
     "asterism.cli.recording": ("made_scene", "rig_from"),
     "asterism.cli.plot_inputs": ("tracks_of", "summary_of"),
@@ -201,6 +204,7 @@ def test_overwrite_replaces_the_file(here, capsys, monkeypatch, name):
 
 INPUTS = {
     "track in.csv -o in.csv": "in.csv",
+    "live in.csv?speed=max --to in.csv": "in.csv",
     "stitch truth.csv -o truth.csv": "truth.csv",
     "fill truth.csv -o truth.csv": "truth.csv",
     "markerset merge set.toml other.toml -o set.toml": "set.toml",

@@ -95,6 +95,7 @@ def instances():
         *methods, changed["gate"], changed["lifecycle"], changed["rigid"],
         am.tracking.ChainOptions(groups="cells", distance=1 / 3),
         am.tracking.Stitched(), am.tracking.Stitched().init(plain), state, update,
+        update.tracks, am.tracking.track_states(truth, model=plain),
         am.tracking.Named(marker_sets=am.learn_marker_set(truth), method=am.GNN()),
         am.tracking.Named(marker_sets=am.learn_marker_set(truth), method=am.GNN()).init(plain),
         am.MCMCDA(window=50, moves=12.345, deadline=1 / 3, confidence=12.345, end_odds=123.4,

@@ -6,9 +6,9 @@ import json
 
 import pytest
 
-from asterism.reporting.guard import MAX_BYTES
 from asterism.edit.messages import parsed
 from asterism.errors import ParameterError
+from asterism.reporting.guard import MAX_BYTES
 from tests.edit.served import Served, write_capture
 
 EDIT = json.dumps({"kind": "clutter", "detections": [0], "name": ""}).encode()

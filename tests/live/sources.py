@@ -88,7 +88,7 @@ LOST = SourceLost("memory: the connection is gone.")
 
 
 def with_faults(frames, rng, *, loss=0.0, twice=0.0, shuffled=0.0, garbage=0.0):
-    """Lose, repeat, reorder within five frames and spoil frames at random."""
+    """Lose, repeat, reorder within five frames and corrupt frames at random."""
     frames = [f for f in frames if rng.random() >= loss]
     places = np.arange(len(frames)) + 0.0
     moved = rng.random(len(frames)) < shuffled

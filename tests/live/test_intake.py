@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import logging
 import math
 
@@ -29,7 +30,7 @@ def taken(frames, **options):
     faults = Faults("test")
     intake = Intake(faults, SourceClock(), **options)
     accepted = [a for f in frames if (a := intake.take(f)) is not None]
-    assert all(a.frame.time < b.frame.time for a, b in zip(accepted, accepted[1:], strict=False))
+    assert all(a.frame.time < b.frame.time for a, b in itertools.pairwise(accepted))
     return (
         [a.frame.number for a in accepted], [a.frame.time for a in accepted],
         [a.n_missing for a in accepted], faults.counts,

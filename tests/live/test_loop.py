@@ -138,6 +138,7 @@ def paused(frames, at, seconds, *, restarts):
 @pytest.mark.parametrize("seconds", [0.03, 0.3, 5.0])
 def test_a_pause_costs_what_a_gap_of_that_length_costs(scene, seconds, restarts, monkeypatch):
     monkeypatch.setattr("asterism.live.loop.MAX_AGE", float("inf"))
+    monkeypatch.setattr("asterism.live.loop.BEHIND", float("inf"))
     monkeypatch.setattr("asterism.live.loop.QUEUE", 10_000)
     made, model = scene
     d = made.detections
@@ -227,6 +228,7 @@ def test_tracking_that_falls_behind_drops_frames_and_stays_in_time(scene, monkey
     run = am.live.run(source, [sink], model=scene[1])
     assert run.faults["late"] > 100
     assert run.n_frames + run.faults["late"] == 600
+    assert "lost" not in run.faults
     assert run.latency.longest < 1.0
     assert max(f.done - f.received for f in sink.frames) < 0.5
 
@@ -265,3 +267,37 @@ def test_a_marker_set_names_the_points(scene):
     named = [name for name in last.names if name]
     assert len(named) == len(set(named)) > 35
     assert set(named) <= set(marker_set.names)
+
+
+@pytest.mark.parametrize("given", [True, False], ids=["model", "no model"])
+def test_a_marker_set_is_learnt_from_the_first_seconds(scene, given, monkeypatch):
+    monkeypatch.setattr("asterism.live.live_tracker.LEARN_SECONDS", 2.0)
+    made, model = scene
+    run, frames = followed(frames_of(made.detections), model if given else None, marker_set="learn")
+    assert run.n_names > 40
+    first = next(f for f in frames if f.names is not None)
+    assert first.time == pytest.approx(2.0 if given else 4.0, abs=0.2)
+    # A marker keeps its name.
+    marker_of = {}
+    d = made.detections
+    n_right = n_all = 0
+    for frame in frames[first.number :]:
+        truth = made.labels[d.offsets[frame.number] : d.offsets[frame.number + 1]]
+        for name, marker in zip(frame.names, truth.tolist(), strict=True):
+            if name is not None and marker >= 0:
+                n_all += 1
+                n_right += marker_of.setdefault(name, marker) == marker
+    assert n_all > 5000
+    assert n_right > 0.97 * n_all
+    assert max(f.names is None for f in frames[first.number :]) is False
+
+
+def test_after_a_long_pause_tracks_begin_anew_and_get_their_names_again(scene):
+    made, model = scene
+    marker_set = am.learn_marker_set(am.simulate.person(frames=200, rate=RATE, seed=3))
+    frames = paused(frames_of(made.detections), 300, 120.0, restarts=False)
+    _, found = followed(frames, model, marker_set=marker_set)
+    before, after = found[299], found[-1]
+    assert not set(before.tracks.ids.tolist()) & set(after.tracks.ids.tolist())
+    assert 45 < len(after.tracks) < 65
+    assert len(set(after.names) & set(before.names) - {None}) > 35

@@ -136,9 +136,7 @@ def test_neighbours_predict_occluded_markers_better_than_their_own_motion(method
     noise = np.random.default_rng(1).normal(0, 2e-4, positions.shape)
     made = am.Tracks.from_dense(truth.detections.times, positions + noise)
     model = am.estimate_model(made.detections).model
-    model = dataclasses.replace(
-        model, population=dataclasses.replace(model.population, max_gap=60)
-    )
+    model = dataclasses.replace(model, population=dataclasses.replace(model.population, max_gap=60))
     errors = []
     for method in methods:
         state, own = method.init(model), []

@@ -168,3 +168,23 @@ def test_states_are_values(person, made):
 def test_sets_that_are_none_are_refused(wrong):
     with pytest.raises(ParameterError, match="marker_sets: expected"):
         Named(marker_sets=wrong, method=am.GNN())
+
+
+def test_after_a_pause_in_which_all_tracks_end_the_names_are_searched_again():
+    truth = am.simulate.fingers(frames=240, seed=1)
+    d = truth.detections
+    method = am.tracking.Named(marker_sets=am.learn_marker_set(truth), method=am.GNN())
+    model = am.estimate_model(d).model
+    state = method.init(model)
+    for time, points in d.part(0, 100):
+        state, update = method.step(state, time, points)
+    before = set(update.names)
+    assert len(before - {None}) > 20
+    end = float(d.times[99])
+    for k in range(1, model.population.max_gap + 2):
+        state, update = method.step(state, end + k * d.step, np.empty((0, 3)))
+    assert len(update.tracks) == 0
+    later = end + (model.population.max_gap + 2) * d.step
+    for time, points in d.part(100, 240):
+        state, update = method.step(state, later + time - float(d.times[100]), points)
+    assert set(update.names) == before

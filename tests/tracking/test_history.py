@@ -35,7 +35,9 @@ def test_states_are_those_of_the_textbook_smoother_in_gaps_as_well():
             x = xs[t - frames[0]].reshape(3, -1)
             np.testing.assert_allclose(now.means[at], x, rtol=1e-6, atol=1e-8)
             np.testing.assert_allclose(
-                now.covariances[at], Ps[t - frames[0]][: x.shape[1], : x.shape[1]], rtol=1e-6,
+                now.covariances[at],
+                Ps[t - frames[0]][: x.shape[1], : x.shape[1]],
+                rtol=1e-6,
                 atol=1e-15,
             )
             np.testing.assert_allclose(history.positions[t, k], now.positions[at])

@@ -12,9 +12,9 @@ import socket
 import threading
 from typing import TYPE_CHECKING, Any
 
-from asterism.reporting.guard import Guard
 from asterism.edit.messages import parsed
 from asterism.errors import AsterismError, ParameterError
+from asterism.reporting.guard import Guard
 
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, Callable, Generator

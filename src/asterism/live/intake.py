@@ -72,6 +72,7 @@ class Intake:
         self._time = -math.inf  # of the stream
         self._shift = 0.0
         self._back: list[int] = []  # numbers of frames behind the last one
+        self._n_dropped = 0
 
     def take(self, frame: SourceFrame) -> Accepted | None:
         """Check a frame.
@@ -107,11 +108,16 @@ class Intake:
             return self._accept(frame, self._by_arrival(frame, last), 0, is_new_clock=True)
         return self._follow(frame, last)
 
+    def dropped(self, n: int) -> None:
+        """Note that frames were dropped on this machine, which are not lost."""
+        self._n_dropped += n
+
     def _follow(self, frame: SourceFrame, last: SourceFrame) -> Accepted:
         n_steps = frame.number - last.number
         step = frame.time - last.time
-        if n_steps > 1:
-            self._faults.add("lost", "frames are missing", n_steps - 1)
+        if (n_lost := n_steps - 1 - self._n_dropped) > 0:
+            self._faults.add("lost", "frames are missing", n_lost)
+        self._n_dropped = 0
         if not math.isfinite(step) or -MAX_JUMP < step <= 0:
             self._faults.add("bad_times", "a time stamp does not advance; the frame rate is used")
             period = self.period if math.isfinite(self.period) else 0.01

@@ -5,14 +5,14 @@ from __future__ import annotations
 import logging
 from collections import deque
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from asterism.errors import SolverLimit
 from asterism.live.switchable import Switchable, SwitchableState, ids_by_votes
-from asterism.model import Detections
-from asterism.tracking import Named, NamedState
+from asterism.model import Detections, Tracks
+from asterism.tracking import Named, NamedState, learn_marker_set
 from asterism.tracking.methods import Update
 
 if TYPE_CHECKING:
@@ -29,8 +29,14 @@ __all__ = ["LiveTracker"]
 
 log = logging.getLogger(__name__)
 
+LEARN_SECONDS = 5.0
+"""Seconds of tracks from which a marker set is learnt."""
 HISTORY = 10.0
 """Seconds of frames from which the model is refined, and which a refined model tracks first."""
+FORGET_SECONDS = 60.0
+"""Length of a pause after which no track continues; a marker set still finds the names."""
+MIN_MARKERS = 4
+"""Smallest number of markers of a learnt marker set."""
 MAX_EMPTY = 130
 """Largest number of missing frames that are tracked as frames without points, as a recording has
 them. By then every motion is too old to predict."""
@@ -61,10 +67,15 @@ class _Rehearsal:
         self.n_done = 0  # of the frames of the history, as counted from its begin
 
     def step(self, past: _Past) -> None:
-        self.state, update = self.method.step(
-            self.state, past.time, past.points, covariances=past.covariances
-        )
-        self.labels.append(update.labels)
+        labels = np.full(len(past.points), -1, dtype=np.int64)
+        try:
+            self.state, update = self.method.step(
+                self.state, past.time, past.points, covariances=past.covariances
+            )
+            labels = update.labels
+        except SolverLimit:  # as in the stream itself, the frame is left out
+            pass
+        self.labels.append(labels)
         self.n_done += 1
 
 
@@ -79,8 +90,9 @@ class LiveTracker:
     ----------
     method : Method
         Method that tracks.
-    marker_sets : sequence of MarkerSet
-        Marker sets that name the tracks; empty for none.
+    marker_sets : sequence of MarkerSet, or "learn"
+        Marker sets that name the tracks; empty for none. A set that is learnt has the names M1,
+        M2, … for the markers of the first `LEARN_SECONDS` seconds.
     model : TrackingModel, optional
         Model, if it is known.
     seed : int, optional
@@ -92,7 +104,7 @@ class LiveTracker:
     def __init__(
         self,
         method: Method[Any],
-        marker_sets: Sequence[MarkerSet],
+        marker_sets: Sequence[MarkerSet] | Literal["learn"],
         model: TrackingModel | None,
         seed: int | None,
         faults: Faults,
@@ -100,11 +112,12 @@ class LiveTracker:
         self._method, self._seed, self._faults = method, seed, faults
         self._inner = Switchable(method=method)
         self._outer: Method[Any] = self._inner
-        if marker_sets:
+        self._learns_names = marker_sets == "learn"
+        if not isinstance(marker_sets, str) and marker_sets:
             self._outer = Named(marker_sets=tuple(marker_sets), method=self._inner)
         self.model = model
         self._state: Any = None if model is None else self._outer.init(model, seed=seed)
-        self._keeps_history = model is None
+        self._refines = model is None
         self._history: deque[_Past] = deque()
         self._n_forgotten = 0
         self._rehearsal: _Rehearsal | None = None
@@ -128,7 +141,9 @@ class LiveTracker:
         """
         frame = accepted.frame
         begin = self._last_time
-        if begin is not None:
+        if begin is not None and frame.time - begin > FORGET_SECONDS:
+            self._forget()
+        elif begin is not None:
             for k in range(1, min(accepted.n_missing, MAX_EMPTY) + 1):
                 self._take(begin + k * period, np.empty((0, frame.points.shape[1])), None)
         return self._take(frame.time, frame.points, frame.covariances)
@@ -149,7 +164,7 @@ class LiveTracker:
                 self._faults.add("too_dense", f"a frame cannot be tracked ({error})")
                 return update
         self._last_time = time
-        if self._keeps_history:
+        if self._refines or self._learns_names:
             self._history.append(_Past(time, points, covariances, update.labels))
             # What a rehearsal still has to track is kept.
             n_needed = 0 if self._rehearsal is None else self._rehearsal.n_done
@@ -160,25 +175,25 @@ class LiveTracker:
                 self._n_forgotten += 1
         return update
 
+    def _forget(self) -> None:
+        """Begin without tracks; new ones get identities that were never used."""
+        before = self._switchable_state()
+        if before is None or self.model is None:
+            return
+        state = SwitchableState(
+            inner=self._method.init(self.model, seed=self._seed),
+            ids=np.empty(0, dtype=np.int64), next_id=before.next_id, n_before=before.n_seen,
+        )  # fmt: skip
+        self._state = NamedState(tracks=state) if isinstance(self._state, NamedState) else state
+
     def recent(self) -> Detections:
         """Return the frames of the last seconds."""
-        noise = None
-        if self._history and all(p.covariances is not None for p in self._history):
-            noise = [p.covariances for p in self._history]
         times = [past.time for past in self._history]
-        points = [past.points for past in self._history]
-        made = Detections.from_frames(times, points)
-        if noise is None:
+        made = Detections.from_frames(times, [past.points for past in self._history])
+        noise = [past.covariances for past in self._history if past.covariances is not None]
+        if len(noise) < len(times) or not noise:
             return made
-        return Detections(
-            times=made.times, offsets=made.offsets, points=made.points,
-            covariances=np.concatenate(noise),
-        )  # fmt: skip
-
-    @property
-    def span(self) -> float:
-        """Seconds of the frames of `recent`."""
-        return self._history[-1].time - self._history[0].time if self._history else 0.0
+        return replace(made, covariances=np.concatenate(noise))
 
     def replace_model(self, model: TrackingModel) -> None:
         """Begin to track with another model."""
@@ -197,13 +212,47 @@ class LiveTracker:
         self._switch(rehearsal)
         return False
 
+    def learn_names(self) -> bool:
+        """Learn a marker set when that is wanted and there are enough frames; return whether."""
+        history, state = self._history, self._state
+        if not self._learns_names or self._rehearsal is not None or state is None or not history:
+            return False
+        last = history[-1].time
+        recent = [p for p in history if p.time > last - LEARN_SECONDS]
+        # Before the first model no frame has labels.
+        if last - recent[0].time < 0.95 * LEARN_SECONDS or not (recent[0].labels >= 0).any():
+            return False
+        labels = np.concatenate([past.labels for past in recent])
+        ids, counts = np.unique(labels[labels >= 0], return_counts=True)
+        ids = ids[2 * counts > len(recent)]
+        if len(ids) < MIN_MARKERS:
+            return False
+        names = {int(identity): f"M{n}" for n, identity in enumerate(ids, 1)}
+        place = np.searchsorted(ids, labels).clip(max=len(ids) - 1)
+        made = Detections.from_frames([p.time for p in recent], [p.points for p in recent])
+        learnt = learn_marker_set(
+            Tracks(
+                detections=made,
+                labels=np.where(ids[place] == labels, place, -1),
+                names=tuple(names.values()),
+            )
+        )
+        self._outer = outer = Named(marker_sets=learnt, method=self._inner)
+        self._state = outer.begin(state, names, [(p.points, p.labels) for p in recent])
+        self._learns_names = False
+        if not self._refines:
+            history.clear()
+        return True
+
     def _switch(self, rehearsal: _Rehearsal) -> None:
         """Let the new model take over."""
         n = len(self._history)
         labels = np.concatenate([*rehearsal.labels[-n:], np.empty(0, dtype=np.int64)])
         old = np.concatenate([past.labels for past in self._history] or [labels])
         before = self._switchable_state()
-        ids, next_id = ids_by_votes(labels, old, 0 if before is None else before.next_id)
+        ids, next_id = None, int(labels.max(initial=-1)) + 1
+        if before is not None:
+            ids, next_id = ids_by_votes(labels, old, before.next_id)
         n_seen = 0 if before is None else before.n_seen
         state = SwitchableState(
             inner=rehearsal.state, ids=ids, next_id=next_id,
@@ -219,7 +268,9 @@ class LiveTracker:
         self.n_models += 1
 
     def _switchable_state(self) -> SwitchableState | None:
-        return self._state.tracks if isinstance(self._state, NamedState) else self._state
+        state = self._state.tracks if isinstance(self._state, NamedState) else self._state
+        assert state is None or isinstance(state, SwitchableState)
+        return state
 
     @property
     def n_names(self) -> int:

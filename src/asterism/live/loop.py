@@ -7,7 +7,7 @@ import logging
 import math
 import threading
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from asterism.errors import AsterismError
 from asterism.live.clock import SourceClock
@@ -20,8 +20,8 @@ from asterism.live.live_run import LiveRun
 from asterism.live.live_tracker import LiveTracker
 from asterism.live.low_latency import low_latency
 from asterism.live.queue import FrameQueue
-from asterism.live.sinks.page import PageSink
 from asterism.live.receiver import Connected, Disconnected, Ended, Receiver
+from asterism.live.sinks.page import PageSink
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -40,6 +40,8 @@ QUEUE = 256
 """Number of frames that wait at most."""
 MAX_AGE = 1.0
 """Seconds after which a waiting frame is dropped, if a later one waits too."""
+BEHIND = 0.1
+"""Age of a frame, seconds, from which on tracking is behind."""
 FIRST_SECONDS = 2.0
 """Seconds of frames from which the first model is estimated."""
 REFINE = (10.0, 30.0, 60.0)
@@ -71,14 +73,15 @@ class LiveLoop:
         *,
         method: Method[Any],
         model: TrackingModel | None,
-        marker_sets: Sequence[MarkerSet],
+        marker_sets: Sequence[MarkerSet] | Literal["learn"],
         seed: int | None,
     ) -> None:
         self._source, self._sinks = source, list(sinks)
         self._faults = Faults(source.name)
         self._clock, self._latency = SourceClock(), LatencyHistogram()
         self._tracker = LiveTracker(method, marker_sets, model, seed, self._faults)
-        self._names = tuple(name for made in marker_sets for name in made.full_names)
+        known = () if isinstance(marker_sets, str) else marker_sets
+        self._names = tuple(name for made in known for name in made.full_names)
         self._estimator: Estimator | None = None
         self._next_estimate = FIRST_SECONDS if model is None else math.inf
         self._first_time: float | None = None
@@ -150,10 +153,14 @@ class LiveLoop:
                     n = int(is_late) + queue.n_dropped - n_dropped
                     n_dropped = queue.n_dropped
                     self._faults.add("late", "tracking is behind and frames are dropped", n)
+                    intake.dropped(n)
                 if is_late:
                     continue
                 accepted = intake.take(item)
                 if accepted is not None:
+                    # Frames that are missing are tracked as empty ones only if there is time.
+                    if not waits and perf_counter() - item.received > BEHIND:
+                        accepted = accepted._replace(n_missing=0)
                     self._track(accepted, intake.period)
             elif isinstance(item, Ended):
                 if item.error is not None:
@@ -217,6 +224,8 @@ class LiveLoop:
         """Begin an estimate of the model when it is due, and take up its result."""
         estimator, tracker = self._estimator, self._tracker
         assert estimator is not None
+        if tracker.learn_names():
+            log.info("%s: a marker set of %d names", self._source.name, tracker.n_names)
         if self._elapsed >= self._next_estimate and not estimator.is_busy:
             estimator.start(tracker.recent())
             late = REFINE[-1] * (1 + self._elapsed // REFINE[-1])

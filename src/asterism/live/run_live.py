@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from asterism.checks import check_kind
 from asterism.errors import ParameterError
@@ -12,7 +12,7 @@ from asterism.live.sinks.parse import parse_sink
 from asterism.live.sources.parse import parse_source
 from asterism.model import MarkerSet, TrackingModel
 from asterism.tracking import Stitched, method_by_name
-from asterism.tracking.methods import Method
+from asterism.tracking.methods import MCMCDA, Method
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -30,7 +30,7 @@ def run(
     *,
     method: Method[Any] | str | None = None,
     model: TrackingModel | None = None,
-    marker_set: MarkerSet | Sequence[MarkerSet] = (),
+    marker_set: MarkerSet | Sequence[MarkerSet] | Literal["learn"] = (),
     seed: int | None = None,
     stop: threading.Event | None = None,
     status: Callable[[LiveRun], Any] | None = None,
@@ -52,11 +52,14 @@ def run(
         Sinks, such as ``"qtm://:22223"``, ``"udp://127.0.0.1:5001"``, ``"out.c3d"`` or
         ``"page://:8000"``.
     method : Method or str, optional
-        Method, or its name; `Stitched` by default, whose identities outlast occlusions.
+        Method as it is, or the name of one that is stitched, because only then identities outlast
+        occlusions; ``Stitched()`` by default. ``"gnn"`` takes half of its time.
     model : TrackingModel, optional
         Tracking model. It is not refined.
-    marker_set : MarkerSet or sequence of MarkerSet
-        Marker set of the subject, or of each subject, by which tracks are named.
+    marker_set : MarkerSet, sequence of MarkerSet, or "learn"
+        Marker set of the subject, or of each subject, by which tracks are named. "learn" learns one
+        from the first five seconds of tracks, with the names M1, M2, …, by which a marker that
+        comes back as a new track is found again.
     seed : int, optional
         Seed of the methods that draw random numbers.
     stop : threading.Event, optional
@@ -83,17 +86,24 @@ def run(
     >>> stop = threading.Event()  # stop.set() in another thread ends the call
     >>> am.live.run("qtm://192.168.0.10", ["page://:8000"], stop=stop)  # doctest: +SKIP
     """
-    if isinstance(method, str):
-        method = method_by_name(method)
-    chosen = Stitched() if method is None else method
+    chosen: Method[Any]
+    if method is None:
+        chosen = Stitched()
+    elif isinstance(method, str):
+        chosen = Stitched(method=method_by_name(method))
+    else:
+        chosen = method
     check_kind("method", chosen, Method, 'am.GNN(), or "gnn"')
-    if getattr(chosen, "window", 1) is None:
+    if isinstance(chosen, MCMCDA) and chosen.window is None:
         raise ParameterError("method", "a method for streams", "mcmcda with window=None")
     if model is not None:
         check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
-    sets = (marker_set,) if isinstance(marker_set, MarkerSet) else tuple(marker_set)
-    for made in sets:
-        check_kind("marker_set", made, MarkerSet, "am.read_marker_set(path)")
+    sets = (marker_set,) if isinstance(marker_set, MarkerSet) else marker_set
+    if not isinstance(sets, str):
+        for made in sets:
+            check_kind("marker_set", made, MarkerSet, "am.read_marker_set(path)")
+    elif sets != "learn":
+        raise ParameterError("marker_set", 'a marker set, or "learn"', repr(sets))
     loop = LiveLoop(
         parse_source(source) if isinstance(source, str) else source,
         [parse_sink(sink) if isinstance(sink, str) else sink for sink in sinks],

@@ -28,8 +28,8 @@ class SwitchableState:
     ----------
     inner : MethodState
         State of the method.
-    ids : ndarray of int
-        Identity of each label so far.
+    ids : ndarray of int, optional
+        Identity of each label so far; None while labels are identities, before a replacement.
     next_id : int
         Identity of the next track.
     n_before : int
@@ -37,7 +37,7 @@ class SwitchableState:
     """
 
     inner: MethodState
-    ids: NDArray[np.int64]
+    ids: NDArray[np.int64] | None = None
     next_id: int = 0
     n_before: int = 0
 
@@ -71,7 +71,7 @@ class Switchable(Method[SwitchableState]):
     ) -> SwitchableState:
         """Return the state before the first frame; see `Method.init`."""
         inner = self.method.init(model, n_axes=n_axes, seed=seed)
-        return SwitchableState(inner=inner, ids=np.empty(0, dtype=np.int64))
+        return SwitchableState(inner=inner)
 
     def step(
         self,
@@ -84,7 +84,11 @@ class Switchable(Method[SwitchableState]):
         """Process the next frame; see `Method.step`."""
         inner, found = self.method.step(state.inner, time, points, covariances=covariances)
         ids, next_id = state.ids, state.next_id
-        highest = int(max(found.labels.max(initial=-1), found.revised_labels.max(initial=-1)))
+        highest = int(found.labels.max(initial=-1))
+        if len(found.revised_labels):
+            highest = max(highest, int(found.revised_labels.max()))
+        if ids is None:
+            return SwitchableState(inner=inner, next_id=max(next_id, highest + 1)), found
         if highest >= len(ids):
             n_new = highest + 1 - len(ids)
             ids = np.concatenate([ids, np.arange(next_id, next_id + n_new)])

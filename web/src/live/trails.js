@@ -5,6 +5,7 @@ import { Color } from "three";
 import { Lines } from "../lines.js";
 
 const LENGTH = 64; // positions of a trail
+const STEP = 0.02; // seconds between two positions
 const MAX_TRAILS = 400;
 
 export class LiveTrails extends Lines {
@@ -20,8 +21,10 @@ export class LiveTrails extends Lines {
   /** Keep the positions of the present frame. */
   keep() {
     const { K, positions, runFirst, filled } = this.capture;
-    this.at = (this.at + 1) % LENGTH;
-    this.when[this.at] = this.capture.times[0];
+    const now = this.capture.times[0];
+    // The newest position follows the marker until it is far enough from the one before.
+    if (now - this.when[(this.at - 1 + LENGTH) % LENGTH] >= STEP) this.at = (this.at + 1) % LENGTH;
+    this.when[this.at] = now;
     for (let k = 0; k < K; k++) {
       const isThere = runFirst[k] === 0 && !filled[k];
       for (let a = 0; a < 3; a++) {

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from asterism.checks import check_number
-from asterism.cli.console import Json, Quiet, console, print_json, print_table
+from asterism.cli.console import Json, Overwrite, Quiet, console, print_json, print_table
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -42,7 +42,10 @@ _To = Annotated[
 _Markers = Annotated[
     list[Path] | None,
     typer.Option(
-        "--markers", metavar="SET", help="Marker set that names the tracks; one for each subject."
+        "--markers",
+        metavar="SET",
+        help="Marker set that names the tracks, one for each subject; or learn, for a set of the "
+        "names M1, M2, … from the first five seconds.",
     ),
 ]
 _Model = Annotated[
@@ -50,7 +53,10 @@ _Model = Annotated[
 ]
 _Method = Annotated[
     str | None,
-    typer.Option(help="Method, one of `asterism methods`.", show_default="smp, stitched"),
+    typer.Option(
+        help="Method whose tracklets are stitched, one of `asterism methods`.",
+        show_default="smp over three frames",
+    ),
 ]
 _Options = Annotated[
     list[str] | None,
@@ -67,6 +73,7 @@ def live(
     method: _Method = None,
     option: _Options = None,
     seed: _Seed = None,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -86,34 +93,55 @@ def live(
         asterism live trial.c3d?speed=max --to tracked.csv
     """
     from asterism.cli.commands.track import made_method
-    from asterism.cli.outputs import read_model
+    from asterism.cli.outputs import check_ending, check_outputs, read_model
     from asterism.live import run
     from asterism.live.sinks.page import PageSink
     from asterism.live.sinks.parse import parse_sink
+    from asterism.tracking import Stitched
     from asterism.tracking.naming.from_file import read_markers
 
     check_number("--seed", seed or 0, above=0, closed=True, integer=True)
     chosen = made_method(method, option or [])
+    files = {text: Path(text) for text in to or [] if "://" not in text and text != "-"}
+    for path in files.values():
+        check_ending("--to", path, ".c3d", ".csv", ".jsonl")
+    replayed = None if "://" in source or source == "-" else Path(source.partition("?")[0])
+    check_outputs(
+        {f"--to {text}": path for text, path in files.items()},
+        [replayed, model, *(markers or [])], overwrite=overwrite,
+    )  # fmt: skip
     sinks = [parse_sink(text) for text in to or []]
-    sets = [read_markers(each) for each in markers or []]
+    tracking_model = None if model is None else read_model(model)
+    learns = [str(each) for each in markers or []] == ["learn"]
+    sets = "learn" if learns else [read_markers(each) for each in markers or []]
     # Standard output may be a sink.
     prints = not (quiet or json) and "-" not in (to or [])
     for sink in sinks:
         if isinstance(sink, PageSink):
-            sink.on_address = lambda address: console(stderr=True).print(
-                f"page: {address}", markup=False, soft_wrap=True
-            )
+            sink.on_address = _print_address
+    for path in files.values():
+        path.unlink(missing_ok=True)
     with _stop_signals() as stop, _status(quiet=quiet or json) as status:
         result = run(
-            source, sinks, method=chosen, model=read_model(model) if model else None,
-            marker_set=sets, seed=seed, stop=stop, status=status,
-        )  # fmt: skip
+            source,
+            sinks,
+            method=None if chosen is None else Stitched(method=chosen),
+            model=tracking_model,
+            marker_set=sets,
+            seed=seed,
+            stop=stop,
+            status=status,
+        )
     if json:
         numbers = {k: v if math.isfinite(v) else None for k, v in result.info.items()}
         learnt = None if result.model is None else result.model.to_dict()
         print_json({"source": source, "sinks": to or [], **numbers, "model": learnt})
     elif prints:
         print_table(_rows(result), title="Stream")
+
+
+def _print_address(address: str) -> None:
+    console(stderr=True).print(f"page: {address}", markup=False, soft_wrap=True)
 
 
 def _rows(run: am.live.LiveRun) -> list[tuple[str, str]]:

@@ -53,7 +53,7 @@ class PageSink:
     Raises
     ------
     ParameterError
-        If the extra ``edit`` is not installed.
+        If the extra ``live`` is not installed.
 
     Examples
     --------
@@ -177,13 +177,13 @@ def check_installed() -> None:
     Raises
     ------
     ParameterError
-        If the extra ``edit`` is missing.
+        If the extra ``live`` is missing.
     """
     try:
         import starlette
         import uvicorn
     except ImportError:
-        hint = "run pip install 'asterism[edit]'"
+        hint = "run pip install 'asterism[live]'"
         expected = "starlette and uvicorn, which are optional"
         raise ParameterError("page://", expected, "not installed", hint) from None
     del starlette, uvicorn

@@ -108,7 +108,8 @@ class EngineState:
         """
         from asterism import _engine
 
-        live = self.tracker.tracks()
+        names = ("ids", "gaps", "log_odds", "means", "covariances")
+        live: dict[str, NDArray[Any]] = dict(zip(names, self.tracker.tracks(), strict=True))
         if isinstance(self.tracker, _engine.TreeTracker):
             live |= self.tracker.chi2()
         return live
@@ -267,7 +268,7 @@ class EngineMethod(Method[EngineState]):
 
 
 def _tracks_of(tracker: Tracker) -> TrackStates:
-    return states_of(tracker.tracks())
+    return states_of(*tracker.tracks())
 
 
 def _too_many(error: Exception) -> SolverLimit:

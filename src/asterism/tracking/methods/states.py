@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from asterism.records import record
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["TrackStates"]
+__all__ = ["TrackStates", "states_of"]
 
 
 @record(eq=False)
@@ -56,12 +56,11 @@ class TrackStates:
     >>> d = am.simulate.cube(frames=20, seed=1).detections
     >>> method = am.GNN()
     >>> state = method.init(am.estimate_model(d).model)
-    >>> for time, points in d:
-    ...     state, update = method.step(state, time, points)
-    >>> state, update = method.step(state, d.times[-1] + d.step, points[1:])
+    >>> state, labels, _ = method.run(state, d.part(0, 19))
+    >>> state, update = method.step(state, d.times[19], d.frame(19)[1:])
     >>> tracks = update.tracks
-    >>> tracks, tracks.ids[~tracks.is_seen], tracks.positions.shape
-    (TrackStates(8 tracks, 1 occluded), array([0]), (8, 3))
+    >>> tracks, tracks.ids[~tracks.is_seen].tolist(), tracks.positions.shape
+    (TrackStates(8 tracks, 1 occluded), [0], (8, 3))
     >>> bool((tracks.existence > 0.99).all())
     True
     """
@@ -108,19 +107,15 @@ class TrackStates:
         return 1 / (1 + np.exp(-np.clip(self.log_odds, -700.0, 700.0)))
 
 
-def states_of(live: dict[str, NDArray[Any]]) -> TrackStates:
-    """Return the states of an engine's tracker.
-
-    Parameters
-    ----------
-    live : dict of ndarray
-        What `EngineState.live` returns.
-
-    Returns
-    -------
-    TrackStates
-    """
+def states_of(
+    ids: NDArray[np.int64],
+    gaps: NDArray[np.int64],
+    log_odds: NDArray[np.float64] | None,
+    means: NDArray[np.float64],
+    covariances: NDArray[np.float64],
+) -> TrackStates:
+    """Return states in the order in which the engine returns them."""
     return TrackStates(
-        ids=live["ids"], means=live["means"], covariances=live["covariances"], gaps=live["gaps"],
-        log_odds=live["log_odds"],
+        ids=ids, means=means, covariances=covariances, gaps=gaps, log_odds=log_odds,
+        names=(None,) * len(ids),
     )  # fmt: skip

@@ -18,7 +18,7 @@ from asterism.tracking.naming.live_names import LiveNames
 from asterism.tracking.naming.name import name_tracks
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -97,7 +97,8 @@ class Named(Method[NamedState]):
     It corresponds to `name_tracks` for a whole capture. The first names come after half a second,
     from any posture and movement; that step takes as long as naming a short capture. Each later
     frame examines one named track, and one that has no name: a track that clearly is another
-    marker is renamed, and a marker that comes back as a new track gets its name again.
+    marker is renamed, and a marker that comes back as a new track gets its name again. When no
+    named track is left, as after a long pause, the names are searched as at first.
 
     Parameters
     ----------
@@ -135,6 +136,45 @@ class Named(Method[NamedState]):
     def _sets(self) -> tuple[MarkerSet, ...]:
         sets = self.marker_sets
         return (sets,) if isinstance(sets, MarkerSet) else tuple(sets)
+
+    def begin(
+        self,
+        tracks: MethodState,
+        names: Mapping[int, str],
+        recent: Sequence[tuple[NDArray[np.float64], NDArray[np.int64]]],
+    ) -> NamedState:
+        """Return a state in which the tracks have names already, without a search for them.
+
+        Parameters
+        ----------
+        tracks : MethodState
+            State of the method that tracks.
+        names : mapping of int to str
+            Name of each named track, by its label; their probability is 1.
+        recent : sequence of (points, labels)
+            The last frames, by which the subjects are measured.
+
+        Returns
+        -------
+        NamedState
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> truth = am.simulate.fingers(frames=60, seed=1)
+        >>> method = am.tracking.Named(marker_sets=am.learn_marker_set(truth), method=am.GNN())
+        >>> state = method.method.init(am.estimate_model(truth.detections).model)
+        >>> d = truth.detections
+        >>> recent = [(d.frame(t), truth.labels[d.offsets[t] : d.offsets[t + 1]]) for t in range(9)]
+        >>> method.begin(state, dict(enumerate(truth.names)), recent)
+        NamedState(23 names)
+        """
+        return NamedState(
+            tracks=tracks,
+            names=dict(names),
+            probabilities=dict.fromkeys(names, 1.0),
+            live=LiveNames.of(self._sets, names, recent),
+        )
 
     def init(self, model: TrackingModel, *, n_axes: int = 3, seed: int | None = None) -> NamedState:
         """Return the state before the first frame.
@@ -181,6 +221,8 @@ class Named(Method[NamedState]):
             tracks=tracks, names=state.names, probabilities=state.probabilities, recent=recent,
             live=state.live, next_search=state.next_search, wait=state.wait,
         )  # fmt: skip
+        if after.live is not None and _has_lost_all(after):
+            after = replace(after, live=None, names={}, probabilities={})
         if after.live is not None:
             after = self._followed(after)
         elif time >= state.next_search:
@@ -230,6 +272,20 @@ class Named(Method[NamedState]):
             if found is not None:
                 names[label], probabilities[label] = found
         return replace(state, live=live, names=names, probabilities=probabilities)
+
+
+def _has_lost_all(state: NamedState) -> bool:
+    """Return whether the tracks of half a second are all without a name, as after a long pause.
+
+    Tracks are examined beside named ones. Without any, all names are searched again.
+    """
+    recent = state.recent
+    if len(recent) < MIN_FRAMES or recent[-1].time - recent[0].time < 0.9 * FIRST:
+        return False
+    if any(label in state.names for label in recent[-1].labels.tolist()):
+        return False
+    labels = {label for frame in recent for label in frame.labels.tolist()}
+    return not labels & state.names.keys()
 
 
 def _tracks_of(update: Update, state: NamedState) -> TrackStates | None:

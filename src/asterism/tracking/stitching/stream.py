@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -15,6 +15,7 @@ from asterism.model.compiled import motion_model, no_transition, transition
 from asterism.records import record
 from asterism.tracking.methods import SMP, Method, TrackStates, Update
 from asterism.tracking.methods.base import MethodState, checked_frame
+from asterism.tracking.methods.states import states_of
 from asterism.tracking.stitching.tracklets import tracklet_model
 from asterism.tracking.stitching.whole import check_options, stitch_options
 
@@ -206,21 +207,9 @@ class Stitched(Method[StitchedState]):
 
 def _tracks_of(stitcher: _engine.LiveStitcher, found: Update) -> TrackStates | None:
     """Return the states of the markers: those of their tracklets, and of the occluded markers."""
-    tracklets = found.tracks
-    if tracklets is None:
+    own = found.tracks
+    if own is None:
         return None
-    markers = stitcher.markers_of(tracklets.ids)
-    ids, gaps, means, covariances = stitcher.unseen(
-        markers, tracklets.is_seen, np.ascontiguousarray(tracklets.positions)
-    )
-    kept = markers >= 0
-    log_odds = tracklets.log_odds
-    if log_odds is not None:
-        log_odds = np.concatenate([log_odds[kept], np.full(len(ids), np.nan)])
-    return TrackStates(
-        ids=np.concatenate([markers[kept], ids]),
-        means=np.concatenate([tracklets.means[kept], means]),
-        covariances=np.concatenate([tracklets.covariances[kept], covariances]),
-        gaps=np.concatenate([tracklets.gaps[kept], gaps]),
-        log_odds=log_odds,
-    )
+    log_odds = np.full(len(own), np.nan) if own.log_odds is None else own.log_odds
+    merged = states_of(*stitcher.states(own.ids, own.gaps, log_odds, own.means, own.covariances))
+    return merged if own.log_odds is not None else replace(merged, log_odds=None)
