@@ -8,7 +8,7 @@ the clock of the machine. Without `--estimate` the model is given; with it, it i
 refined during the run.
 
 With `--day`, one stream with a simulated clock of 24 hours is measured instead: each hour the
-source sends 20 s of frames and pauses. The table has memory, tracks, clock drift and mean step.
+source sends 20 s of frames and pauses. The table has memory and tracks.
 
     python benchmarks/live.py [--seconds S] [--rate HZ] [--method NAME] [--estimate]
                               [--protocols NAME …] [--day] [--markdown FILE]
@@ -172,11 +172,10 @@ def measured(name: str, options: argparse.Namespace) -> list[str]:
 class Day:
     """A source of 24 hours by its own clock: 20 s of frames each hour, then a pause."""
 
-    def __init__(self, d: am.Detections, rate: float, marks: list[tuple[float, int]]) -> None:
+    def __init__(self, d: am.Detections, rate: float) -> None:
         self.name, self.rate, self.waits = "a day", rate, True
         self.faults: dict[str, int] = {}
-        self._frames, self._marks = back_and_forth(d), marks
-        self._n = self._hour = 0
+        self._frames, self._n = back_and_forth(d), 0
 
     def open(self) -> None:
         """Do nothing."""
@@ -189,8 +188,6 @@ class Day:
         del timeout
         n_each = int(20 * self.rate)
         hour, at = divmod(self._n, n_each)
-        if at == 0:
-            self._marks.append((time.perf_counter(), self._n))
         if hour == 24:
             raise EndOfSource(self.name)
         _, points = next(self._frames)
@@ -226,18 +223,16 @@ def day(options: argparse.Namespace) -> list[str]:
     """Measure a stream of 24 hours; return the lines of the page."""
     d = scene(options.rate)
     model = am.estimate_model(d.part(0, int(2 * options.rate))).model
-    marks: list[tuple[float, int]] = []
     sink = Memory(options.rate)
-    run = am.live.run(Day(d, options.rate, marks), [sink], model=model)
-    each = np.diff([t for t, _ in marks]) / np.diff([n for _, n in marks])
+    run = am.live.run(Day(d, options.rate), [sink], model=model)
     rows = [
-        [f"{hour + 1}", f"{mb:.0f}", f"{n}", f"{1e3 * each[hour]:.2f}"]
+        [f"{hour + 1}", f"{mb:.0f}", f"{n}"]
         for hour, mb, n in sink.rows
         if hour % 4 == 3 or hour == 0
     ]
     drift = f"clock drift {1e6 * run.drift:.1f} ppm of 20 ppm"
     return [
-        *table(["hour", "memory, MB", "tracks", "time of a frame, ms"], rows), "",
+        *table(["hour", "memory, MB", "tracks"], rows), "",
         f"{run.n_frames:,} frames; {drift}.", "", conditions(),
     ]  # fmt: skip
 

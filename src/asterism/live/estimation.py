@@ -1,7 +1,7 @@
 """Estimation of the model while a stream runs, in a process of its own.
 
-Run as ``python -m asterism.live.estimation``, it reads detections from standard input and writes a
-model to standard output. A thread would delay the frames, because it shares the interpreter.
+The process reads detections from standard input and writes a model to standard output
+(`estimate_input`). A thread would delay the frames, because it shares the interpreter.
 """
 
 from __future__ import annotations
@@ -19,12 +19,14 @@ import numpy as np
 
 from asterism.errors import AsterismError
 from asterism.model import Detections, TrackingModel
+from asterism.tracking import estimate_model
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["BackgroundEstimator", "DirectEstimator", "Estimator", "differs"]
+__all__ = ["BackgroundEstimator", "DirectEstimator", "Estimator", "differs", "estimate_input"]
 
+_PROGRAM = "from asterism.live.estimation import estimate_input; estimate_input()"
 _NICENESS = 10
 _RATIO = 1.25
 """Ratio of two values from which on a refined model replaces the present one."""
@@ -36,6 +38,10 @@ class Estimator(Protocol):
     @property
     def is_busy(self) -> bool:
         """Whether an estimate has begun whose result was not taken up."""
+        ...
+
+    def prepare(self) -> None:
+        """Get ready for an estimate that comes soon."""
         ...
 
     def start(self, detections: Detections) -> None:
@@ -61,6 +67,9 @@ class DirectEstimator:
     def is_busy(self) -> bool:
         """Whether there is a result that was not taken up."""
         return self._result is not None
+
+    def prepare(self) -> None:
+        """Do nothing."""
 
     def start(self, detections: Detections) -> None:
         """Estimate a model."""
@@ -88,13 +97,20 @@ class BackgroundEstimator:
         """Whether the process runs, or its result was not taken up."""
         return self._thread is not None
 
-    def start(self, detections: Detections) -> None:
-        """Start the process."""
-        process = subprocess.Popen(
-            [sys.executable, "-m", "asterism.live.estimation"],
+    def prepare(self) -> None:
+        """Start the process, which imports what it needs and waits."""
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", _PROGRAM],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
             start_new_session=True,  # Ctrl-C is for this process alone
         )  # fmt: skip
+
+    def start(self, detections: Detections) -> None:
+        """Send the detections to the process."""
+        if self._process is None:
+            self.prepare()
+        process = self._process
+        assert process is not None
         arrays = {"times": detections.times, "offsets": detections.offsets,
                   "points": detections.points}  # fmt: skip
         if detections.covariances is not None:
@@ -105,7 +121,6 @@ class BackgroundEstimator:
             np.savez(packed, allow_pickle=False, **arrays)
             self._output = process.communicate(packed.getvalue())[0]
 
-        self._process = process
         self._thread = threading.Thread(target=talk, name="model", daemon=True)
         self._thread.start()
 
@@ -121,10 +136,15 @@ class BackgroundEstimator:
 
     def close(self) -> None:
         """Kill a process that still runs."""
-        if self._process is not None:
-            self._process.kill()
+        process, self._process = self._process, None
+        if process is None:
+            return
+        process.kill()
         if self._thread is not None:
-            self._thread.join(1.0)
+            self._thread.join(5.0)
+            self._thread = None
+        else:
+            process.communicate()
 
 
 def differs(new: TrackingModel, old: TrackingModel) -> bool:
@@ -166,22 +186,17 @@ def _spreads(model: TrackingModel) -> list[float]:
 
 
 def _estimated(detections: Detections) -> TrackingModel | str:
-    from asterism.tracking import estimate_model
-
     try:
         return estimate_model(detections).model
     except AsterismError as error:
         return str(error)
 
 
-def _main() -> None:
+def estimate_input() -> None:
+    """Estimate the model of the detections on standard input, and write it to standard output."""
     if hasattr(os, "nice"):
         os.nice(_NICENESS)
     with np.load(io.BytesIO(sys.stdin.buffer.read()), allow_pickle=False) as arrays:
         result = _estimated(Detections(**arrays))
     text = f"error\n{result}" if isinstance(result, str) else f"model\n{result.to_toml()}"
     sys.stdout.buffer.write(text.encode())
-
-
-if __name__ == "__main__":
-    _main()

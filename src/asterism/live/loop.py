@@ -107,6 +107,8 @@ class LiveLoop:
                 self._faults, self._clock, rate=source.rate, in_real_time=not waits
             )
             self._estimator = DirectEstimator() if waits else BackgroundEstimator()
+            if math.isfinite(self._next_estimate):
+                self._estimator.prepare()
             with low_latency():
                 receiver.start()
                 self._follow(queue, intake, stop, status, waits=waits)
