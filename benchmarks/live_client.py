@@ -46,16 +46,16 @@ class Count:
 
     def take(self, number: int, parts: list[tuple[Any, NDArray[np.float64]]], scale: float) -> bool:
         """Compare a frame; return whether it was the last."""
-        self.n += 1
-        self.last = time.monotonic()
-        same = number == self.n
+        n, self.last = self.n + 1, time.monotonic()
+        same = number == n
         for got, want in parts:
             want = (want * scale).astype(np.float32)
             same &= np.array_equal(np.array(got, np.float32), want, equal_nan=True)
         self.n_wrong += not same
-        if self.n % EVERY == 0:
-            print(self.n, file=sys.__stdout__, flush=True)
-        return self.n == self._wanted
+        if n % EVERY == 0:
+            print(n, file=sys.__stdout__, flush=True)
+        self.n = n  # after that line, as the last number lets another thread print the end
+        return n == self._wanted
 
     def wait(self) -> None:
         """Wait for the last frame."""

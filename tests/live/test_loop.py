@@ -301,3 +301,23 @@ def test_after_a_long_pause_tracks_begin_anew_and_get_their_names_again(scene):
     assert not set(before.tracks.ids.tolist()) & set(after.tracks.ids.tolist())
     assert 45 < len(after.tracks) < 65
     assert len(set(after.names) & set(before.names) - {None}) > 35
+
+
+def test_the_model_is_refined_while_the_stream_runs(scene, monkeypatch):
+    monkeypatch.setattr("asterism.live.loop.REFINE", (3.0, 4.5))
+    monkeypatch.setattr("asterism.live.loop.differs", lambda new, old: True)
+    made, _ = scene
+    run, frames = followed(frames_of(made.detections), None)
+    assert run.n_models == 3
+    assert judged(frames[210:], made).idf1 > 0.9
+    # No identity changes at a replacement.
+    d = made.detections
+    for at in (300, 450):
+        before, after = frames[at - 3], frames[at + 3]
+        of = [
+            dict(zip(made.labels[d.offsets[f.number] : d.offsets[f.number + 1]], f.labels,
+                     strict=True)) for f in (before, after)
+        ]  # fmt: skip
+        common = [m for m in of[0] if m >= 0 and of[0][m] >= 0 and of[1].get(m, -1) >= 0]
+        assert len(common) > 40
+        assert sum(of[0][m] != of[1][m] for m in common) <= 1

@@ -227,7 +227,7 @@ def test_addresses():
 @pytest.mark.parametrize(
     "text",
     ["qtm://", "natnet://", "lsl://", "udp://host", "http://host", "://", "qtm://host:99999",
-     "qtm://host/path", "qtm://host?speed=2", "natnet://host?lokal=1", "a.c3d?speed=0",
+     "qtm://host/path", "qtm://host?speed=2", "natnet://host?locals=1", "a.c3d?speed=0",
      "a.c3d?speed=fast", "a.c3d?spede=2", "qtm://me@host"],
 )  # fmt: skip
 def test_addresses_that_are_none(text):

@@ -77,7 +77,7 @@ def serve(
     >>> am.live.serve(truth, server, labelled=True, begin=stop.set, stop=stop)  # before a client
     0
     >>> server.names[:2], server.rate
-    (('track_0', 'track_1'), 30.0)
+    (('M00', 'M01'), 30.0)
     """
     check_kind("tracks", tracks, Tracks)
     d = tracks.detections

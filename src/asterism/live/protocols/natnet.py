@@ -206,7 +206,7 @@ def encode_message(kind: Message, body: bytes = b"") -> bytes:
 
     Examples
     --------
-    >>> encode_message(Message.REQUEST, b"FrameRate\\0").hex(" ", 2)
+    >>> encode_message(Message.REQUEST, b"FrameRate\0").hex(" ", -2)
     '0200 0a00 4672 616d 6552 6174 6500'
     """
     if len(body) > _LARGEST_BODY:

@@ -164,7 +164,7 @@ def encode_text(kind: Packet, text: str, order: str = "<") -> bytes:
 
     Examples
     --------
-    >>> encode_text(Packet.COMMAND, "version 1.25").hex(" ", 4)
+    >>> encode_text(Packet.COMMAND, "version 1.25").hex(" ", -4)
     '15000000 01000000 76657273 696f6e20 312e3235 00'
     """
     body = text.encode() + b"\0"
