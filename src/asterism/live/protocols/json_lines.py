@@ -7,7 +7,6 @@ three coordinates each, metres; null for a missing one). A line that goes out ha
 
 from __future__ import annotations
 
-import json
 import math
 from typing import TYPE_CHECKING, Any, cast
 
@@ -56,9 +55,11 @@ def decode_line(line: bytes) -> tuple[int, float, NDArray[np.float64]]:
     """
     if len(line) > LONGEST:
         raise PacketError("a line that is too long")
+    import orjson
+
     try:
-        found = json.loads(line)
-    except (ValueError, RecursionError):
+        found = orjson.loads(line)
+    except ValueError:
         raise PacketError("a line that is no JSON") from None
     if not isinstance(found, dict):
         raise PacketError("a line that is no JSON object")
@@ -104,6 +105,8 @@ def encode_line(frame: LiveFrame) -> bytes:
     ...     number=12, time=0.12, points=np.zeros((1, 3)), labels=np.array([4]), names=("LASI",)))
     b'{"frame":12,"time":0.12,"points":[[0.0,0.0,0.0]],"labels":[4],"names":["LASI"]}\n'
     """
+    import orjson
+
     record: dict[str, Any] = {
         "frame": int(frame.number),
         "time": float(frame.time),
@@ -114,8 +117,7 @@ def encode_line(frame: LiveFrame) -> bytes:
         record["names"] = list(frame.names)
     if frame.tracks is not None:
         record["tracks"] = _tracks(frame.tracks)
-    text = json.dumps(record, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
-    return text.encode() + b"\n"
+    return orjson.dumps(record, option=orjson.OPT_APPEND_NEWLINE)
 
 
 def _tracks(states: TrackStates) -> list[dict[str, Any]]:

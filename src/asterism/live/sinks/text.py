@@ -6,8 +6,9 @@ import os
 import queue
 import sys
 import threading
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
+from asterism.checks import check_extra
 from asterism.errors import SinkError
 from asterism.live.protocols.json_lines import encode_line
 from asterism.live.sinks.osc import connected
@@ -32,7 +33,10 @@ class JsonFileSink:
         File to create; an existing one is refused.
     """
 
+    _packages: ClassVar[tuple[str, ...]] = ("orjson",)
+
     def __init__(self, path: Path) -> None:
+        check_extra(str(path), "live", *self._packages)
         self.name, self._path = str(path), path
         self.faults: dict[str, int] = {}
         self._file: int | None = None
@@ -68,6 +72,8 @@ class CsvSink(JsonFileSink):
     path : Path
         File to create; an existing one is refused.
     """
+
+    _packages = ()
 
     def open(self, header: StreamHeader) -> None:
         """Create the file.
@@ -108,6 +114,7 @@ class JsonUdpSink:
     """
 
     def __init__(self, name: str, host: str, port: int) -> None:
+        check_extra(name, "live", "orjson")
         self.name, self._target = name, (host, port)
         self.faults: dict[str, int] = {}
         self._socket: socket.socket | None = None
@@ -143,6 +150,7 @@ class StandardOutput:
     """Sink that writes JSON lines to standard output; a reader that falls behind misses frames."""
 
     def __init__(self) -> None:
+        check_extra("JSON lines", "live", "orjson")
         self.name = "-"
         self.faults: dict[str, int] = {}
         self._lines: queue.Queue[bytes | None] = queue.Queue(_QUEUE)

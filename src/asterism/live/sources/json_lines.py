@@ -11,6 +11,7 @@ import threading
 import time
 from typing import TYPE_CHECKING
 
+from asterism.checks import check_extra
 from asterism.errors import SourceError, SourceLost
 from asterism.live.frame import SourceFrame
 from asterism.live.protocols.json_lines import LONGEST, decode_line
@@ -38,6 +39,7 @@ class UdpSource:
     """
 
     def __init__(self, name: str, host: str, port: int) -> None:
+        check_extra(name, "live", "orjson")
         self.name, self._address = name, (host, port)
         self.rate = 0.0
         self.waits = False
@@ -110,6 +112,7 @@ class StandardInput:
     """
 
     def __init__(self, stream: BinaryIO | None = None) -> None:
+        check_extra("JSON lines", "live", "orjson")
         self.name = "-"
         self.rate = 0.0
         self.waits = True  # as a pipe does
