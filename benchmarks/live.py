@@ -239,7 +239,7 @@ def day(options: argparse.Namespace) -> list[str]:
 
 def main() -> None:
     """Run what the command line names."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--rate", type=float, default=240.0)
     parser.add_argument("--method", help="stitched method, smp over three frames by default")

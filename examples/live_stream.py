@@ -15,12 +15,13 @@ def main() -> None:
     model = am.estimate_model(capture).model  # of an earlier take, say
 
     method = am.GNN()
-    state = method.init(model)
+    state, tracks = method.init(model), None
     for time, points in capture:
         state, update = method.step(state, time, points)
         if len(update.revised):
             print(f"{time:.2f} s: {len(update.revised)} earlier detections got their names")
-    tracks = update.tracks
+        tracks = update.tracks
+    assert tracks is not None  # every method of Asterism reports them
     for identity, gap, place in zip(tracks.ids, tracks.gaps, tracks.positions, strict=True):
         x, y, z = place
         occluded = f", not seen for {gap} frames" if gap else ""
