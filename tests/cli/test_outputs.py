@@ -20,8 +20,8 @@ FILES = {
     "track --report": ("track in.csv -o new.csv --report OUT", ".html"),
     "track --run -o": ("track in.csv --run new -o OUT", ".csv"),
     "large": ("large plain.csv -o OUT", ".csv"),
-    "live": ("live in.csv?speed=max --to OUT", ".csv"),
-    "live, C3D": ("live in.csv?speed=max --to OUT", ".c3d"),
+    "live --to": ("live in.csv?speed=max --to OUT", ".csv"),
+    "live --to a C3D": ("live in.csv?speed=max --to OUT", ".c3d"),
     "edit": ("edit in.csv --script edits.toml -o OUT", ".csv"),
     "stitch": ("stitch truth.csv -o OUT", ".csv"),
     "fill": ("fill truth.csv -o OUT", ".csv"),
@@ -247,7 +247,7 @@ def test_every_command_that_writes_is_in_these_tables():
     found = set()
     for name, command in _commands(program):
         names = {p.name for p in command.params}
-        writes = names & {"out", "save", "by_frame", "run", "report"}
+        writes = names & {"out", "save", "by_frame", "run", "report", "to"}
         assert ("overwrite" in names) == bool(writes), name
         if writes:
             found.add(name)

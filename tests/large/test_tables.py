@@ -203,8 +203,8 @@ def test_nulls_and_text_in_parquet(tmp_path):
 
 
 def test_without_pyarrow_the_error_says_what_to_install(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
-    with pytest.raises(am.ParameterError, match=r"pip install 'asterism\[large\]'"):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(am.ParameterError, match=r"pip install 'asterism\[parquet\]'"):
         am.large.track(tmp_path / "a.parquet", tmp_path / "b.parquet")
 
 

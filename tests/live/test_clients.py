@@ -77,11 +77,25 @@ def test_qtm_rt(version):
         assert packet.get_6d_euler()[1] == []
 
 
-def test_qtm_rt_is_refused_another_version():
+def test_qtm_rt_is_refused_another_version(monkeypatch):
     qtm_rt = pytest.importorskip("qtm_rt", reason="pip install qtm-rt")
+    protocol, transports = qtm_rt.protocol.QTMProtocol, []
+    made = protocol.connection_made
+
+    def noted(self, transport):
+        transports.append(transport)
+        made(self, transport)
+
+    monkeypatch.setattr(protocol, "connection_made", noted)
+
+    async def connect(port):
+        client = await qtm_rt.connect("127.0.0.1", port=port, version="1.40")
+        transports[0].close()  # the client leaves its socket open
+        await asyncio.sleep(0.01)
+        return client
+
     with qtm_server() as server:
-        client = asyncio.run(qtm_rt.connect("127.0.0.1", port=server.port, version="1.40"))
-    assert client is None
+        assert asyncio.run(connect(server.port)) is None
 
 
 @pytest.mark.parametrize("version", ["1.19", "1.25"])
