@@ -39,6 +39,7 @@ bench: $(VENV)/.bench
 	  --markdown docs/tables/whole_captures.md
 	$(BIN)/python benchmarks/stream.py --markdown docs/tables/stream.md
 	$(BIN)/python benchmarks/stream.py --flat --markdown docs/tables/stream_flat.md
+	$(BIN)/python benchmarks/live.py --method gnn --markdown docs/tables/live_latency.md
 	$(BIN)/python benchmarks/live.py --day --rate 100 --markdown docs/tables/live_day.md
 	$(BIN)/python benchmarks/joint.py --markdown docs/tables/joint.md
 	$(BIN)/python benchmarks/k_best.py --markdown docs/tables/k_best.md

@@ -244,7 +244,7 @@ def main() -> None:
     parser.add_argument("--rate", type=float, default=240.0)
     parser.add_argument("--method", help="stitched method, smp over three frames by default")
     parser.add_argument("--estimate", action="store_true")
-    parser.add_argument("--protocols", nargs="+", choices=ROUTES, default=["JSON over UDP"])
+    parser.add_argument("--protocols", nargs="+", choices=ROUTES, default=list(ROUTES))
     parser.add_argument("--day", action="store_true")
     parser.add_argument("--markdown", type=Path)
     options = parser.parse_args()
