@@ -44,7 +44,7 @@ struct StartFrame {
   std::vector<Point> points;
 };
 
-struct Chain {
+struct StartChain {
   double score = 0;
   std::array<std::int32_t, kMaxStartFrames> path{};  // point in each frame of the window, or -1
 };
@@ -62,9 +62,9 @@ class ChainSearch {
   }
 
   // Adds the chains from one detection of the first frame, best first.
-  void from(std::int32_t a, std::vector<Chain>& out) const {
+  void from(std::int32_t a, std::vector<StartChain>& out) const {
     Memory memory;
-    Chain chain;
+    StartChain chain;
     chain.path.fill(-1);
     chain.path[0] = a;
     const Point& y = frames_[0].points[a];
@@ -76,7 +76,7 @@ class ChainSearch {
     if (out.end() - begin > opt_.max_chains) out.resize(first + opt_.max_chains);
   }
 
-  static bool is_better(const Chain& a, const Chain& b) {
+  static bool is_better(const StartChain& a, const StartChain& b) {
     return a.score != b.score ? a.score > b.score : a.path < b.path;
   }
 
@@ -93,8 +93,8 @@ class ChainSearch {
   }
 
   void extend(std::size_t f, int n_taken, int n_missed, const Point& last, double last_time,
-              const MotionState& from, Chain& chain, Memory& memory,
-              std::vector<Chain>& out) const {
+              const MotionState& from, StartChain& chain, Memory& memory,
+              std::vector<StartChain>& out) const {
     if (f == frames_.size()) {
       if (n_taken >= opt_.min_detections && chain.score > opt_.min_score) out.push_back(chain);
       return;
@@ -150,7 +150,7 @@ class ChainSearch {
 };
 
 // The selected chains, ordered by their first detection.
-inline std::vector<Chain> find_starts(const MotionModel& m, const PairingGains& gains,
+inline std::vector<StartChain> find_starts(const MotionModel& m, const PairingGains& gains,
                                       const StartOptions& options,
                                       std::vector<StartFrame> frames, std::int32_t n_threads) {
   constexpr std::int64_t per_task = 1024;
@@ -159,24 +159,24 @@ inline std::vector<Chain> find_starts(const MotionModel& m, const PairingGains& 
   for (StartFrame& frame : frames) order.push_back(sort_in_space(frame.points, m.axis.D, cell));
   const ChainSearch search(m, gains, options, frames);
   const auto n = static_cast<std::int64_t>(frames[0].points.size());
-  std::vector<std::vector<Chain>> found((n + per_task - 1) / per_task);
+  std::vector<std::vector<StartChain>> found((n + per_task - 1) / per_task);
   in_parallel(static_cast<std::int64_t>(found.size()), n_threads, [&](std::int32_t, std::int64_t k) {
     for (std::int64_t a = k * per_task; a < std::min(n, (k + 1) * per_task); ++a)
       search.from(static_cast<std::int32_t>(a), found[k]);
-    for (Chain& chain : found[k])
+    for (StartChain& chain : found[k])
       for (std::size_t f = 0; f < frames.size(); ++f)
         if (chain.path[f] >= 0) chain.path[f] = order[f][chain.path[f]];
   });
-  std::vector<Chain> all;
-  for (std::vector<Chain>& part : found) {
+  std::vector<StartChain> all;
+  for (std::vector<StartChain>& part : found) {
     all.insert(all.end(), part.begin(), part.end());
     part = {};
   }
   std::sort(all.begin(), all.end(), ChainSearch::is_better);
   std::vector<std::vector<char>> is_taken;
   for (const StartFrame& frame : frames) is_taken.emplace_back(frame.points.size(), 0);
-  std::vector<Chain> selected;
-  for (const Chain& chain : all) {
+  std::vector<StartChain> selected;
+  for (const StartChain& chain : all) {
     bool is_free = true;
     for (std::size_t f = 0; f < frames.size() && is_free; ++f)
       is_free = chain.path[f] < 0 || !is_taken[f][chain.path[f]];
@@ -186,7 +186,7 @@ inline std::vector<Chain> find_starts(const MotionModel& m, const PairingGains& 
     selected.push_back(chain);
   }
   std::sort(selected.begin(), selected.end(),
-            [](const Chain& a, const Chain& b) { return a.path[0] < b.path[0]; });
+            [](const StartChain& a, const StartChain& b) { return a.path[0] < b.path[0]; });
   return selected;
 }
 

@@ -173,7 +173,7 @@ auto find_all_starts(const MotionModel& m, const ScoreModel& score, const StartO
   for (std::size_t f = 0; f < W; ++f)
     frames[f] = {times.data()[f], steps[f],
                  {all.begin() + offsets.data()[f], all.begin() + offsets.data()[f + 1]}};
-  std::vector<Chain> chains;
+  std::vector<StartChain> chains;
   const PairingGains gains{score};
   {
     nb::gil_scoped_release release;
@@ -183,7 +183,7 @@ auto find_all_starts(const MotionModel& m, const ScoreModel& score, const StartO
   Owned<std::int32_t> paths(K * W), gaps(K);
   Owned<double> states(K * width), scores(K);
   each_on_threads(K, n_threads, [&](std::size_t k) {
-    const Chain& chain = chains[k];
+    const StartChain& chain = chains[k];
     MotionState s = begin_state(m, frames[0].points[chain.path[0]]);
     std::int32_t gap = 0;
     for (std::size_t f = 0; f < W; ++f) {
