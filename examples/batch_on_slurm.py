@@ -11,8 +11,9 @@ must be reachable over the network and is to run until the end.
 from __future__ import annotations
 
 import argparse
+from typing import Any
 
-from dask_jobqueue import SLURMCluster
+from dask_jobqueue.slurm import SLURMCluster
 
 import asterism as am
 
@@ -28,7 +29,8 @@ def main() -> None:
     parser.add_argument("--queue", help="partition of SLURM")
     parser.add_argument("--interface", help="network interface, such as ib0")
     options = parser.parse_args()
-    with SLURMCluster(
+    start: Any = SLURMCluster
+    with start(
         cores=1, processes=1, memory=options.memory, walltime=options.walltime,
         queue=options.queue, interface=options.interface,
     ) as cluster:  # fmt: skip

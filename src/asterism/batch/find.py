@@ -104,8 +104,12 @@ def plan_batch(
                 got = f"{name}, the result of both {owners[name]} and {job.source}"
                 raise ParameterError("sources", "one result for each capture", got)
     planned: list[Planned] = []
+
+    def examine(one: tuple[Job, str]) -> Planned:
+        return _examined(one[0], out, one[1])
+
     with ThreadPoolExecutor(_READERS) as pool:
-        for each in pool.map(lambda one: _examined(one[0], out, one[1]), found):
+        for each in pool.map(examine, found):
             planned.append(each)
             if progress is not None:
                 progress(len(planned), len(found))
