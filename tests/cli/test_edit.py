@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import builtins
+import sys
 
 import pytest
 
@@ -89,13 +89,7 @@ def test_a_taken_port_is_reported(capture, capsys):
 
 
 def test_a_missing_extra_is_named(capture, capsys, monkeypatch):
-    real = builtins.__import__
-
-    def without(name, *rest, **options):
-        if name.startswith(("uvicorn", "starlette")):
-            raise ImportError(name)
-        return real(name, *rest, **options)
-
-    monkeypatch.setattr(builtins, "__import__", without)
+    for name in ("starlette", "uvicorn"):
+        monkeypatch.setitem(sys.modules, name, None)
     assert "run pip install 'asterism[edit]'" in refused("edit trial.c3d", capsys).lower()
     run("edit trial.c3d --script trial.edits.toml", capsys)  # needs no server

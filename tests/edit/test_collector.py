@@ -7,6 +7,7 @@ import pytest
 
 import asterism as am
 from asterism.cli import main
+from asterism.reporting.page.head import bundled
 from tests.edit.served import CAPTURE
 from tests.reporting.browser import CHROMIUM
 
@@ -67,5 +68,8 @@ def test_pages_without_an_editor_carry_none_of_it(folder):
     am.report(tracks, folder / "editor.html", editor=True)
     plain, editor = ((folder / f"{name}.html").read_bytes() for name in ("plain", "editor"))
     assert b"edit-swap" not in plain
-    assert b"x-asterism-token" not in plain
+    script = bundled("editor.js").encode()
+    assert script in editor
+    assert script not in plain
+    assert b"connect-src" not in plain  # so its policy, none by default, lets it send nothing
     assert len(editor) < len(plain) + 100_000

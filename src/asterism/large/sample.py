@@ -15,7 +15,6 @@ from itertools import islice
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from asterism.errors import ParameterError
 from asterism.large.tracker import LargeTracker
@@ -195,6 +194,8 @@ def _scaled(model: TrackingModel, factors: tuple[float, ...]) -> list[TrackingMo
 
 def _spacing(sample: Detections) -> float:
     """Return the median distance of a detection to the nearest other one of its frame, metres."""
+    from scipy.spatial import KDTree
+
     frames = [points for _, points in sample if len(points) > 1]
     nearest = [KDTree(points).query(points, k=2)[0][:, 1] for points in frames]
     return float(np.median(np.concatenate(nearest))) if nearest else 0.0
