@@ -246,7 +246,8 @@ def test_sinks_are_used_by_several_threads_one_after_the_other(tmp_path):
 @pytest.mark.parametrize(
     "text",
     ["osc://:9000", "osc://host", "udp://host", "lsl://", "out.trc", "ftp://x", "qtm://:70000",
-     "natnet://:1510?version=four", "natnet://:1510?version=2.9", "qtm://:1?version=1", "qtm://me.org"],
+     "natnet://:1510?version=four", "natnet://:1510?version=2.9", "qtm://:1?version=1",
+     "qtm://me.org"],
 )  # fmt: skip
 def test_addresses_that_are_none(text):
     with pytest.raises(ParameterError):

@@ -12,7 +12,7 @@ import selectors
 import socket
 import struct
 import threading
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import asterism
 from asterism.errors import SinkError
@@ -226,17 +226,18 @@ class QtmServer:
         """Accept, answer and flush, until the server is closed."""
         while not self._is_closing:
             for key, mask in self._selector.select():
+                found = cast("socket.socket", key.fileobj)  # nothing else is registered
                 if isinstance(key.data, Connection):
                     self._attend(key.data, mask)
                 elif key.data == "woken":
-                    key.fileobj.recv(4096)  # type: ignore[union-attr]
+                    found.recv(4096)
                 elif key.data == "discovery":
-                    self._answer_discovery(key.fileobj)  # type: ignore[arg-type]
+                    self._answer_discovery(found)
                 else:
-                    self._accept(key.fileobj, key.data)  # type: ignore[arg-type]
+                    self._accept(found, key.data)
             self._tidy()
         for key in list(self._selector.get_map().values()):
-            key.fileobj.close()  # type: ignore[union-attr]
+            cast("socket.socket", key.fileobj).close()
         self._selector.close()
         self._clients.clear()
 

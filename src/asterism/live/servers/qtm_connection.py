@@ -136,7 +136,10 @@ class Connection:
                 body.release()
                 del self._received[:size]
                 # XML would change settings, which only the master may.
-                commands.append({Packet.COMMAND: text, Packet.XML: "new"}.get(kind, ""))  # type: ignore[call-overload]
+                if kind == Packet.COMMAND:
+                    commands.append(text)
+                else:
+                    commands.append("new" if kind == Packet.XML else "")
         except PacketError:
             self.is_over = True
         self.is_over |= len(self._received) > _LONGEST_COMMAND
