@@ -234,3 +234,17 @@ def test_a_full_disk_and_a_table_of_another_form(tmp_path, scene):
         am.large.track(
             source, tmp_path / "out.csv", model=MODEL, columns=am.large.Columns(time="when")
         )
+
+
+def test_reading_parquet_does_not_keep_what_was_read(tmp_path):
+    rng = np.random.default_rng(0)
+    schema = pa.schema([("frame", pa.int64()), ("x", pa.float64()), ("y", pa.float64())])
+    with pq.ParquetWriter(tmp_path / "long.parquet", schema) as writer:
+        for t in range(40):
+            columns = [np.full(20_000, t), rng.random(20_000), rng.random(20_000)]
+            writer.write_table(pa.table(columns, schema=schema))
+    before = pa.total_allocated_bytes()
+    table = open_table(tmp_path / "long.parquet")
+    held = [pa.total_allocated_bytes() - before for _ in table.chunks()]
+    assert len(held) > 3
+    assert max(held) < 0.5 * (tmp_path / "long.parquet").stat().st_size
