@@ -2,8 +2,9 @@
 
 from asterism.large.columns import Columns
 from asterism.large.sample import estimate_from_start
+from asterism.large.state import DecidedFrame, LargeState
 from asterism.large.track import LargeRun, track
-from asterism.large.tracker import DecidedFrame, LargeState, LargeTracker
+from asterism.large.tracker import LargeTracker
 
 __all__ = [
     "Columns",

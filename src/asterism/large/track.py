@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from asterism.large.assignment import Mapper
     from asterism.large.rows import Table, TableFrame
-    from asterism.large.tracker import DecidedFrame
+    from asterism.large.state import DecidedFrame
     from asterism.model import TrackingModel
 
 __all__ = ["SUFFIXES", "LargeRun", "check_form", "open_table", "track"]
