@@ -35,6 +35,7 @@ class OpenFrame:
 
     Examples
     --------
+    >>> import numpy as np
     >>> one = np.ones((1, 1, 1))
     >>> OpenFrame(number=0, time=0.0, F=one, Q=one, points=np.zeros((4, 3)), owners=np.zeros(4))
     OpenFrame(number 0, 4 detections)
@@ -64,6 +65,7 @@ class DecidedFrame:
 
     Examples
     --------
+    >>> import numpy as np
     >>> DecidedFrame(number=0, labels=np.array([0, -1]))
     DecidedFrame(number=0, labels=[0, -1])
     """
