@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/parallel.hpp"
 #include "confidence/distance_profiles.hpp"
 #include "confidence/exchanges.hpp"
 #include "python/arrays.hpp"
@@ -122,15 +123,27 @@ class Profiles {
   // unknown marker relative to the own track, other tracks by falling density (P, 3), their
   // densities (P, 3)).
   nb::tuple compare(const In<std::int64_t>& tracks, const In<std::int64_t>& frames,
-                    const In<std::int64_t>& offsets, const In<std::int64_t>& partners) {
+                    const In<std::int64_t>& offsets, const In<std::int64_t>& partners,
+                    std::int32_t n_threads) {
     const std::size_t n_parts = tracks.size();
     require(partners.size() == 2 * n_parts, "partners: two of each part");
-    std::vector<PartEvidence> found;
-    for (TrackPart& part : parts_of(tracks, frames, offsets)) {
-      const std::size_t p = found.size();
-      part.partners = {static_cast<std::int32_t>(partners.data()[2 * p]),
-                       static_cast<std::int32_t>(partners.data()[2 * p + 1])};
-      found.push_back(profiles_->compare(part));
+    require(n_threads >= 1, "n_threads: at least 1");
+    std::vector<TrackPart> parts = parts_of(tracks, frames, offsets);
+    for (std::size_t p = 0; p < n_parts; ++p)
+      parts[p].partners = {static_cast<std::int32_t>(partners.data()[2 * p]),
+                           static_cast<std::int32_t>(partners.data()[2 * p + 1])};
+    std::vector<PartEvidence> found(n_parts);
+    {
+      nb::gil_scoped_release release;
+      // Each thread learns the profiles that its parts need in a copy of its own.
+      const auto n_blocks = static_cast<std::int64_t>((n_parts + kBlock - 1) / kBlock);
+      const auto n_copies = std::min<std::int64_t>(n_threads, n_blocks);
+      std::vector<DistanceProfiles> copies(n_copies, *profiles_);
+      in_parallel(n_blocks, n_threads, [&](std::int32_t worker, std::int64_t block) {
+        const auto first = static_cast<std::size_t>(block) * kBlock;
+        for (std::size_t p = first; p < std::min(first + kBlock, n_parts); ++p)
+          found[p] = copies[worker].compare(parts[p]);
+      });
     }
     constexpr std::size_t n_most = PartEvidence::kMost;
     Owned<std::int64_t> others(n_parts * n_most);
@@ -158,6 +171,8 @@ class Profiles {
   }
 
  private:
+  static constexpr std::size_t kBlock = 64;  // parts that a thread takes at a time
+
   std::vector<TrackPart> parts_of(const In<std::int64_t>& tracks, const In<std::int64_t>& frames,
                                   const In<std::int64_t>& offsets) const {
     require(offsets.size() == tracks.size() + 1, "tracks and offsets: of each part");
@@ -199,6 +214,7 @@ void bind_confidence(nb::module_& module) {
                     const In<std::int64_t>&, std::int64_t, double>(),
            "points"_a, "labels"_a, "offsets"_a, "samples"_a, nb::kw_only(), "n_tracks"_a, "noise"_a)
       .def("agreements", &Profiles::agreements, "pairs"_a)
-      .def("compare", &Profiles::compare, "tracks"_a, "frames"_a, "offsets"_a, "partners"_a)
+      .def("compare", &Profiles::compare, "tracks"_a, "frames"_a, "offsets"_a, "partners"_a,
+           nb::kw_only(), "n_threads"_a)
       .def("densities", &Profiles::densities, "tracks"_a, "frames"_a, "offsets"_a, "others"_a);
 }

@@ -61,7 +61,7 @@ def profiles_of(positions, noise):
     )  # fmt: skip
 
 
-def compared(positions, noise, parts):
+def compared(positions, noise, parts, threads=1):
     some = [
         frames[np.arange(n) * (len(frames) - 1) // max(n - 1, 1)]
         for _, frames, _ in parts
@@ -72,6 +72,7 @@ def compared(positions, noise, parts):
         np.concatenate([np.empty(0, np.int64), *some]),
         np.cumsum([0, *map(len, some)]).astype(np.int64),
         np.array([partners for *_, partners in parts], dtype=np.int64).reshape(-1, 2),
+        n_threads=threads,
     )
 
 
@@ -97,6 +98,16 @@ def test_comparisons_are_those_of_the_reference(n_axes, missing, seed):
     n_known, n_others = held_to_reference(positions, parts_in(rng, positions, 40))
     assert n_known > 10
     assert n_others > 10
+
+
+def test_any_number_of_threads_gives_the_same_evidence():
+    rng = np.random.default_rng(3)
+    positions = captured(rng, n_axes=3, missing=0.3)
+    parts = parts_in(rng, positions, 300)
+    alone = [each.tobytes() for each in compared(positions, 0.002, parts)]
+    for threads in (2, 3, 50):
+        found = compared(positions, 0.002, parts, threads)
+        assert [each.tobytes() for each in found] == alone
 
 
 def test_few_frames_and_few_tracks_are_compared_alike():
@@ -126,7 +137,7 @@ MADE = {
 }  # fmt: skip
 PART = {
     "tracks": np.array([0]), "frames": np.array([0, 1]), "offsets": np.array([0, 2]),
-    "partners": np.array([[1, -1]]),
+    "partners": np.array([[1, -1]]), "n_threads": 1,
 }  # fmt: skip
 
 

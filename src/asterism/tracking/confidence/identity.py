@@ -160,7 +160,7 @@ def examine(
     other = np.full(len(starts) + 1, -1)
     other[:-1][has] = partner[at[has]]
     partners = np.stack([other[:-1], other[1:]], axis=1)
-    evidence = compare(tracks, parts, partners, model.sensor.noise_sigma)
+    evidence = compare(tracks, parts, partners, model.sensor.noise_sigma, threads=threads)
     return Examined(
         exchanges=exchanges, uncertain=uncertain, link=link, parts=parts, partners=partners,
         evidence=evidence,

@@ -115,7 +115,12 @@ def part_tracks(
 
 
 def compare(
-    tracks: Tracks, parts: Parts, partners: NDArray[np.int64], noise_sigma: float
+    tracks: Tracks,
+    parts: Parts,
+    partners: NDArray[np.int64],
+    noise_sigma: float,
+    *,
+    threads: int = 1,
 ) -> Evidence:
     """Compare the distances of parts to other tracks with those that tracks keep.
 
@@ -130,6 +135,8 @@ def compare(
         for none.
     noise_sigma : float
         Standard deviation of a coordinate, metres.
+    threads : int
+        Number of threads; it has no influence on the result.
     """
     frame = tracks.detections.frame_of
     order, _ = tracks.by_track
@@ -152,6 +159,7 @@ def compare(
             np.searchsorted(profiles.frames, frames).astype(np.int64),
             offsets,
             np.ascontiguousarray(partners[used]),
+            n_threads=threads,
         )
         arrays = evidence.is_known, evidence.unknown, evidence.alternatives, evidence.densities
         for values, own in zip(arrays, found, strict=True):
