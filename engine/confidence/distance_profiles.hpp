@@ -128,8 +128,9 @@ class DistanceProfiles {
     double median = kNone, spread = 0;
     bool is_known() const { return median >= 0; }
   };
-  // Medians of a distance that is not known, and of one that has not been computed.
-  static constexpr double kNone = -1, kLater = -2;
+  // Medians of a distance that is not known, of one that has not been computed, and of one of which
+  // only is known that it is not steady.
+  static constexpr double kNone = -1, kLater = -2, kLoose = -3;
 
   // Measures the distances of a part, and chooses the steadiest ones of its own track. Returns
   // whether there are enough.
@@ -138,8 +139,7 @@ class DistanceProfiles {
     steady_.clear();
     for (std::size_t r = 0; r < references_.size(); ++r) {
       if (distances_[r] < 0) continue;
-      const Distance& own = distance(part.track, r);
-      if (own.is_known() && own.spread < kSteady) steady_.push_back({own.spread, r});
+      if (const Distance* own = steady(part.track, r)) steady_.push_back({own->spread, r});
     }
     if (steady_.size() < kMinNeighbours) return false;
     const std::size_t n = std::min(steady_.size(), kNeighbours);
@@ -264,12 +264,23 @@ class DistanceProfiles {
 
   // The distance of a track to a reference, which is computed when it is first needed.
   const Distance& distance(std::int32_t track, std::size_t r) {
+    Distance& own = kept(track, r);
+    if (own.median == kLater || own.median == kLoose) own = learn(track, r, false);
+    return own;
+  }
+  // The same if it is steady, null otherwise. Most distances between segments are not, which takes
+  // less time to find out than their spread.
+  const Distance* steady(std::int32_t track, std::size_t r) {
+    Distance& own = kept(track, r);
+    if (own.median == kLater) own = learn(track, r, true);
+    return own.is_known() && own.spread < kSteady ? &own : nullptr;
+  }
+  Distance& kept(std::int32_t track, std::size_t r) {
     std::vector<Distance>& profile = profiles_[track];
     if (profile.empty()) profile.assign(references_.size(), {kLater});
-    if (profile[r].median == kLater) profile[r] = learn(track, r);
     return profile[r];
   }
-  Distance learn(std::int32_t track, std::size_t r) {
+  Distance learn(std::int32_t track, std::size_t r, bool only_steady) {
     if (references_[r] == track) return {};
     std::vector<double>& values = of_samples_;
     values.clear();
@@ -280,10 +291,24 @@ class DistanceProfiles {
     if (values.size() < kMinFrames) return {};
     // The root of the median is the median of the roots, which most of the time are not needed.
     Distance found{std::sqrt(median_of(values))};
+    const double bend = kBend * found.median, least = floor2_ + bend * bend;
+    if (only_steady && is_surely_loose(values, found.median, least)) return {kLoose};
     for (double& value : values) value = std::abs(std::sqrt(value) - found.median);
-    const double spread = kOfNormal * median_of(values), bend = kBend * found.median;
-    found.spread = std::sqrt(spread * spread + floor2_ + bend * bend);
+    const double spread = kOfNormal * median_of(values);
+    found.spread = std::sqrt(spread * spread + least);
     return found;
+  }
+  // Whether too few of the squared distances are near their median for a steady distance. `least` is
+  // the part of the squared spread that does not depend on them.
+  static bool is_surely_loose(std::span<const double> squares, double median, double least) {
+    constexpr double kBeyondRounding = 1 + 1e-9;
+    const double left = kSteady * kSteady - least;
+    if (left <= 0) return true;
+    const double far = kBeyondRounding * std::sqrt(left) / kOfNormal;
+    const double low = std::max(median - far, 0.0), high = median + far;
+    std::size_t n_near = 0;
+    for (const double square : squares) n_near += square >= low * low && square <= high * high;
+    return n_near <= squares.size() / 2;
   }
   // The median distances of a part to the references, -1 where there is none.
   void measure(const TrackPart& part) {

@@ -1,7 +1,12 @@
 // Bindings of the search for names.
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
+#include <cmath>
 #include <numeric>
+#include <utility>
+#include <vector>
 
 #include "naming/name_evidence.hpp"
 #include "naming/name_search.hpp"
@@ -146,6 +151,33 @@ Out<double> scores_in_window(const In<double>& points, const In<std::int64_t>& r
   return out.give({scored.size(), static_cast<std::size_t>(tables.M)});
 }
 
+// The positions of the tracks with these labels, rising, in some frames of (points, labels): (F, A,
+// 3), NaN without a detection; 2-D points have z = 0.
+Out<double> positions_of_labels(const In<std::int64_t>& tracks,
+                                const std::vector<std::pair<In<double>, In<std::int64_t>>>& frames) {
+  const auto wanted = flat(tracks);
+  require(std::ranges::is_sorted(wanted), "tracks: rising");
+  const std::size_t A = wanted.size();
+  Owned<double> out(frames.size() * A * 3);
+  std::fill_n(out.data.get(), frames.size() * A * 3, NAN);
+  for (std::size_t f = 0; f < frames.size(); ++f) {
+    const auto& [points, labels] = frames[f];
+    const std::size_t n = labels.size();
+    require(labels.ndim() == 1 && points.ndim() == 2 && points.shape(0) == n &&
+                points.shape(1) >= 2 && points.shape(1) <= 3,
+            "frames: points of shape (n, 2) or (n, 3) and n labels");
+    const std::size_t D = points.shape(1);
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto at = std::ranges::lower_bound(wanted, labels.data()[i]);
+      if (at == wanted.end() || *at != labels.data()[i]) continue;
+      double* to = out.data.get() + 3 * (f * A + static_cast<std::size_t>(at - wanted.begin()));
+      to[2] = 0;
+      std::copy_n(points.data() + i * D, D, to);
+    }
+  }
+  return out.give({frames.size(), A, 3});
+}
+
 }  // namespace
 
 void bind_naming(nb::module_& module) {
@@ -172,6 +204,7 @@ void bind_naming(nb::module_& module) {
            "names"_a);
   module.def("window_scores", &scores_in_window, "points"_a, nb::kw_only(), "rows"_a, "holder"_a, "neighbours"_a,
              "distances"_a, "variances"_a, "weights"_a);
+  module.def("positions_of_labels", &positions_of_labels, "tracks"_a, "frames"_a);
   nb::class_<NameSearch>(module, "NameSearch")
       .def("__init__", &make_name_search, nb::keep_alive<1, 2>(), "evidence"_a, nb::kw_only(),
            "groups"_a, "partner"_a, "near"_a)

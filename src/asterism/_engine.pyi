@@ -621,6 +621,9 @@ def window_scores(
     weights: Floats,
 ) -> Floats: ...
 
+# Positions of tracks in frames of (points, labels): (frames, tracks, 3), NaN without a detection.
+def positions_of_labels(tracks: Ints, frames: Sequence[tuple[Floats, Ints]]) -> Floats: ...
+
 class StartOptions:
     def __init__(
         self,

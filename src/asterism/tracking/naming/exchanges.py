@@ -147,13 +147,14 @@ def _best(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, int, i
         sums = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
         return sums[last] - sums[first]  # of each stretch, and column
 
-    def log_spread(s: NDArray[np.float64], squares: NDArray[np.float64]) -> NDArray[np.float64]:
-        return 0.5 * np.log(np.maximum(squares / n - (s / n) ** 2, 0) + NOISE**2)
+    def variance(s: NDArray[np.float64], squares: NDArray[np.float64]) -> NDArray[np.float64]:
+        mean = s / n
+        return np.maximum(squares / n - mean * mean, 0) + NOISE**2
 
     move, move2 = within(y - x), within(y**2 - x**2)
     sx, sy, sx2, sy2 = x.sum(axis=0), y.sum(axis=0), (x**2).sum(axis=0), (y**2).sum(axis=0)
-    before = log_spread(sx, sx2) + log_spread(sy, sy2)
-    after = log_spread(sx + move, sx2 + move2) + log_spread(sy - move, sy2 - move2)
-    gain = 0.5 * (before - after).mean(axis=1)
+    before = variance(sx, sx2) * variance(sy, sy2)
+    after = variance(sx + move, sx2 + move2) * variance(sy - move, sy2 - move2)
+    gain = 0.25 * (np.log(before).mean() - np.log(after).mean(axis=1))
     best = int(np.argmax(gain))
     return float(gain[best]), int(first[best]), int(last[best])

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import repeat
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from asterism import _engine
-from asterism.tracking.naming.positions import scattered
 from asterism.tracking.naming.probabilities import TEMPERATURE
 from asterism.tracking.naming.subject import Subject
 from asterism.tracking.naming.windows import MIN_LOG_ODDS, TAKEN
@@ -33,7 +33,7 @@ MIN_CHANGE = 16.0
 """Sum of log odds by which examinations of a track must favour another name."""
 MAX_EACH = 8.0
 """Largest log odds of one examination, so that a single one never changes a name."""
-EVERY = 5
+EVERY = 10
 """Number of frames between two poses that are measured, and between two measured markers."""
 RIGID = 0.006
 """Spread of distances, metres, by which the size of the subject is measured."""
@@ -127,13 +127,13 @@ class LiveNames:
             sets=self.sets, marker_of=self.marker_of, sizes=self.sizes, sums=sums,
             subject=self.subject, rivals=self.rivals, turn=turn,
         )  # fmt: skip
-        alive = sorted({*labels.tolist()} - {-1})
+        alive = np.sort(labels[labels >= 0])
         if len(recent) < self.LENGTH or len(alive) < 2:
             return after, {}
-        return after._examined(np.array(alive, dtype=np.int64), recent)
+        return after._examined(alive, recent)
 
     def _examined(self, alive: NDArray[np.int64], recent: Frames) -> tuple[LiveNames, Changes]:
-        window = _Window(self, alive, _dense(alive, recent))
+        window = _Window(self, alive, _engine.positions_of_labels(alive, recent))
         after = _Changed(dict(self.marker_of), dict(self.rivals), {})
         new = np.flatnonzero((window.marker < 0) & window.is_whole)
         named = np.flatnonzero(window.marker >= 0)
@@ -229,10 +229,10 @@ class _Window:
         self, names: LiveNames, alive: NDArray[np.int64], dense: NDArray[np.float64]
     ) -> None:
         self.alive, self.dense = alive, dense
-        self.is_whole = np.isfinite(dense[..., 0]).all(axis=0)
+        self.is_whole = ~np.isnan(dense[..., 0]).any(axis=0)
         self.tables = names.subject
-        of = names.marker_of
-        self.marker = np.array([of.get(label, -1) for label in alive.tolist()], dtype=np.int64)
+        found = map(names.marker_of.get, alive.tolist(), repeat(-1))
+        self.marker = np.fromiter(found, np.int64, len(alive))
         self.holder = np.full(names.sums.shape[1], -1)
         has = np.flatnonzero(self.marker >= 0)
         self.holder[self.marker[has]] = has
@@ -273,32 +273,17 @@ class _Window:
         return m, gain
 
 
-def _dense(alive: NDArray[np.int64], recent: Frames) -> NDArray[np.float64]:
-    """Return the positions of the tracks `alive`, ordered, in some frames, (F, A, 3)."""
-    points = np.concatenate([p for p, _ in recent])
-    labels = np.concatenate([own for _, own in recent])
-    frame = np.repeat(np.arange(len(recent)), [len(own) for _, own in recent])
-    column = np.minimum(np.searchsorted(alive, labels), len(alive) - 1)
-    used = alive[column] == labels
-    return scattered(points[used], frame[used], column[used], len(recent), len(alive))
-
-
 def _distance_sums(
     marker_of: Mapping[int, int], points: NDArray[np.float64], labels: NDArray[np.int64], M: int
 ) -> NDArray[np.float64]:
     """Return whether markers have a distance in a frame, the distance and its square, (3, M, M)."""
-    markers = np.array([marker_of.get(label, -1) for label in labels.tolist()], dtype=np.int64)
-    pose = scattered(
-        points[markers >= 0],
-        np.zeros(int((markers >= 0).sum()), np.int64),
-        markers[markers >= 0],
-        1,
-        M,
-    )[0]
-    distance = np.sqrt(((pose[:, None] - pose) ** 2).sum(axis=2))
-    known = np.isfinite(distance)
-    distance[~known] = 0
-    return np.stack([known, distance, distance**2])
+    markers = np.fromiter(map(marker_of.get, labels.tolist(), repeat(-1)), np.int64, len(labels))
+    pose = _engine.positions_of_labels(np.arange(M), [(points, markers)])[0]
+    offsets = pose[:, None] - pose
+    squares = np.einsum("ijd,ijd->ij", offsets, offsets)
+    known = ~np.isnan(squares)
+    squares[~known] = 0
+    return np.stack([known, np.sqrt(squares), squares])
 
 
 def _starts(sets: tuple[MarkerSet, ...]) -> list[int]:

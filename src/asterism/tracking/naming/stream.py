@@ -227,7 +227,7 @@ class Named(Method[NamedState]):
             after = self._followed(after)
         elif time >= state.next_search:
             after = self._searched(after)
-        names = tuple(after.names.get(label) for label in update.labels.tolist())
+        names = tuple(map(after.names.get, update.labels.tolist()))
         read = partial(_tracks_of, update, after)
         return after, replace(update, names=names, read_tracks=read)
 
