@@ -28,13 +28,23 @@ def test_a_marker_in_two_tracks_is_found(person, first):
     assert agreeing(tracks, NOISE) == [(7, person.n_tracks)]
 
 
-def test_both_tracks_may_take_turns_for_a_few_frames(person):
-    turns = [145, 147, *range(150, 300)]
+@pytest.mark.parametrize(
+    "turns", [[145, 147, *range(150, 300)], range(100, 200), range(100, 300, 2)]
+)
+def test_both_tracks_may_take_turns(person, turns):
     assert agreeing(parted(person, 7, turns), NOISE) == [(7, person.n_tracks)]
 
 
-def test_a_long_overlap_is_not_of_one_marker(person):
-    assert agreeing(parted(person, 7, range(100, 300, 2)), NOISE) == []
+def test_tracks_with_a_common_frame_are_of_two_markers(person):
+    """The same marker in two tracks, and a second point beside it in one frame."""
+    tracks = parted(person, 7, range(150, 300))
+    d, frame = tracks.detections, tracks.detections.frame_of
+    (row,) = np.flatnonzero((tracks.labels == 7) & (frame == 100))
+    points = [d.frame(t) for t in range(d.n_frames)]
+    points[100] = np.concatenate([points[100], d.points[[row]] + 0.001])
+    labels = np.insert(tracks.labels, d.offsets[101], person.n_tracks)
+    both = am.Tracks(detections=am.Detections.from_frames(d.times, points), labels=labels)
+    assert agreeing(both, NOISE) == []
 
 
 def test_tracks_of_two_markers_stay_apart(person):

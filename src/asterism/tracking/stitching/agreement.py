@@ -20,8 +20,6 @@ AGREEMENT = 2.0
 simulated tracks above it, 20 of 21 were of one marker; of those from 1 to 2, none of four."""
 MARGIN = 1.0
 """Smallest difference to the ratio of every other pair with one of both tracks."""
-MAX_OVERLAP = 10
-"""Largest number of frames from the start of the later track to the end of the earlier one."""
 MAX_PAIRS = 10_000
 """Number of pairs above which none is compared: so many tracks are fragments, not markers."""
 
@@ -29,7 +27,7 @@ MAX_PAIRS = 10_000
 def agreeing(
     tracks: Tracks, noise_sigma: float, max_occlusion: int | None = None
 ) -> list[tuple[int, int]]:
-    """Find pairs of tracks of one marker: one ends about where the other begins, or before.
+    """Find pairs of tracks of one marker: they are in no frame together, and keep equal distances.
 
     Parameters
     ----------
@@ -43,7 +41,7 @@ def agreeing(
     Returns
     -------
     list of (int, int)
-        The earlier and the later track of each pair, each track at most once.
+        The track that begins first and the other of each pair, each track at most once.
     """
     pairs = _in_turn(tracks, max_occlusion)
     if not len(pairs):
@@ -67,16 +65,24 @@ def _in_turn(tracks: Tracks, max_occlusion: int | None) -> NDArray[np.int64]:
     used = np.flatnonzero(tracks.lengths)
     frames = tracks.detections.frame_of[order]
     first, last = frames[offsets[used]], frames[offsets[used + 1] - 1]
-    overlap = last[:, None] - first[None] + 1
-    may_follow = (overlap <= MAX_OVERLAP) & (first[:, None] < first[None])
+    begins_first = (first[:, None] < first[None]) | np.triu(first[:, None] == first[None], 1)
+    begin, end = np.minimum(first[:, None], first[None]), np.maximum(last[:, None], last[None])
+    lengths = tracks.lengths[used]
+    may_be_one = begins_first & (lengths[:, None] + lengths[None] <= end - begin + 1)
     if max_occlusion is not None:
-        may_follow &= -overlap <= max_occlusion
-    before, after = np.nonzero(may_follow)
+        may_be_one &= first[None] - last[:, None] - 1 <= max_occlusion
+    before, after = np.nonzero(may_be_one)
     if len(before) > MAX_PAIRS:
         return np.empty((0, 2), dtype=np.int64)
     of = [frames[offsets[k] : offsets[k + 1]] for k in used]
+
+    def are_apart(a: int, b: int) -> bool:
+        low, high = first[b], min(last[a], last[b])
+        one, other = (f[slice(*np.searchsorted(f, [low, high + 1]))] for f in (of[a], of[b]))
+        return len(one) + len(other) <= high - low + 1 and not np.isin(one, other).any()
+
     is_apart = [
-        overlap[a, b] <= 0 or not np.isin(of[a][-MAX_OVERLAP:], of[b][:MAX_OVERLAP]).any()
-        for a, b in zip(before, after, strict=True)
+        last[a] < first[b] or are_apart(a, b)
+        for a, b in zip(before.tolist(), after.tolist(), strict=True)
     ]
     return np.stack([used[before[is_apart]], used[after[is_apart]]], axis=1).astype(np.int64)
