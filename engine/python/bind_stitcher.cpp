@@ -10,6 +10,7 @@
 #include "python/arrays.hpp"
 #include "python/bindings.hpp"
 #include "python/motion_arrays.hpp"
+#include "stitch/distance_exchanges.hpp"
 #include "stitch/live_stitcher.hpp"
 
 using namespace nb::literals;
@@ -124,6 +125,40 @@ nb::tuple marker_states(LiveStitcher& self, const In<std::int64_t>& labels,
   for (const LiveStitcher::UnseenMarker& one : unseen)
     out.add(one.marker, one.gap, std::numeric_limits<double>::quiet_NaN(), one.state);
   return out.give();
+}
+
+// Returns the stretches in which tracks have each other's marker, of all pairs with a track that
+// `is_examined`: tracks (n, 2), first frame and end (n, 2), log odds.
+nb::tuple exchanged_stretches(const MotionModel& m, const In<double>& times,
+                              const In<std::int32_t>& kind, const In<double>& F,
+                              const In<double>& Q, const In<double>& points,
+                              const In<std::int64_t>& frames, const In<std::int64_t>& offsets,
+                              const In<bool>& is_examined, double p_detection, double noise) {
+  require(p_detection >= 0 && p_detection < 1, "p_detection: from 0 to below 1");
+  require(noise >= 0, "noise: at least 0");
+  require(std::ranges::all_of(flat(points), [](double x) { return std::isfinite(x); }),
+          "points: finite");
+  const Timeline line = timeline(m, times, kind, F, Q);
+  const TrackPoints tracks(points, frames, offsets, m.axis.D, line.times.size());
+  require(is_examined.ndim() == 1 && is_examined.size() == tracks.n_tracks(),
+          "is_examined: one for each track");
+  const std::vector<char> examined(is_examined.data(), is_examined.data() + is_examined.size());
+  std::vector<ExchangedStretch> found;
+  {
+    nb::gil_scoped_release release;
+    DistanceExchanges search(m, line, p_detection, noise);
+    for (std::size_t k = 0; k < tracks.n_tracks(); ++k)
+      search.add(tracks.points_of(k), tracks.frames_of(k));
+    found = search.find(examined);
+  }
+  Owned<std::int64_t> own(2 * found.size()), stretch(2 * found.size());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    for (const int side : {0, 1}) own.data[2 * i + side] = found[i].track[side];
+    stretch.data[2 * i] = found[i].first;
+    stretch.data[2 * i + 1] = found[i].end;
+  }
+  return nb::make_tuple(own.give({found.size(), 2}), stretch.give({found.size(), 2}),
+                        array_of<double>(found, &ExchangedStretch::gain));
 }
 
 std::vector<RigidPair> to_pairs(const In<double>& a, const In<double>& b,
@@ -294,6 +329,9 @@ void bind_stitcher(nb::module_& module) {
           "labels"_a, "before"_a, "weights"_a)
       .def_prop_ro("n_cuts", [](const StitcherPass& self) { return self.stitcher.n_cuts(); })
       .def_prop_ro("n_markers", [](const StitcherPass& self) { return self.stitcher.n_markers(); });
+  module.def("exchanged_stretches", &exchanged_stretches, "motion"_a, "times"_a, "kind"_a, "F"_a, "Q"_a,
+             "points"_a, "frames"_a, "offsets"_a, "is_examined"_a, nb::kw_only(), "p_detection"_a,
+             "noise"_a);
   nb::class_<LiveStitcher>(module, "LiveStitcher")
       .def(nb::init<const MotionModel&, const StitchOptions&, std::int64_t>(), "motion"_a,
            "options"_a, nb::kw_only(), "lag"_a)

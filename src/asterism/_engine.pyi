@@ -482,6 +482,23 @@ def exchange_ratios(
     p_detection: float,
 ) -> Floats: ...
 
+# (tracks (n, 2), first frame and end (n, 2), log odds) of stretches in which tracks have each
+# other's marker, for pairs with a track that is examined.
+def exchanged_stretches(
+    motion: MotionModel,
+    times: Floats,
+    kind: Shorts,
+    F: Floats,
+    Q: Floats,
+    points: Floats,
+    frames: Ints,
+    offsets: Ints,
+    is_examined: NDArray[np.bool_],
+    *,
+    p_detection: float,
+    noise: float,
+) -> tuple[Ints, Ints, Floats]: ...
+
 # `samples` are the frames from which the distances that each track keeps are learnt.
 class DistanceProfiles:
     def __init__(

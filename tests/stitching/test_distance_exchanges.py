@@ -1,0 +1,193 @@
+"""Stretches in which two tracks have each other's marker are found and exchanged back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import asterism as am
+from asterism import _engine
+from asterism.model.compiled import motion_model, steps_of
+from asterism.tracking.stitching.exchanged import exchanged_back
+from tests.references.distance_exchanges import stretches
+from tests.scenes import sized
+
+NOISE = 1e-3
+
+
+def positions_of(tracks):
+    d = tracks.detections
+    positions = np.full((d.n_frames, tracks.n_tracks, d.n_axes), np.nan)
+    inside = tracks.labels >= 0
+    positions[d.frame_of[inside], tracks.labels[inside]] = d.points[inside]
+    return positions
+
+
+def model_of(d):
+    return am.tracking.tracklet_model(am.estimate_model(d).model)
+
+
+def exchanged(tracks, pair, frames):
+    """Exchange two tracks in some frames."""
+    labels = tracks.labels.copy()
+    inside = np.isin(tracks.detections.frame_of, frames)
+    is_one, is_other = (inside & (tracks.labels == k) for k in pair)
+    labels[is_one], labels[is_other] = pair[1], pair[0]
+    return am.Tracks(detections=tracks.detections, labels=labels)
+
+
+def near_pairs(tracks):
+    """Pairs of markers less than 20 cm apart in the median."""
+    positions = positions_of(tracks)
+    distance = np.linalg.norm(positions[:, :, None] - positions[:, None], axis=3)
+    return np.argwhere(np.triu(np.nanmedian(distance, axis=0) < 0.2, 1))
+
+
+def of_engine(tracks, model, noise=NOISE):
+    d, (kind, F, Q) = tracks.detections, steps_of(model.motion, tracks.detections.times)
+    order, offsets = tracks.by_track
+    found = _engine.exchanged_stretches(
+        motion_model(model, d.n_axes), d.times, kind, F, Q, np.ascontiguousarray(d.points[order]),
+        d.frame_of[order].astype(np.int64), offsets.astype(np.int64),
+        np.ones(tracks.n_tracks, dtype=bool), p_detection=0.9, noise=noise,
+    )  # fmt: skip
+    return [
+        (*pair.tolist(), *stretch.tolist(), gain)
+        for pair, stretch, gain in zip(*found, strict=True)
+    ]
+
+
+def motion_of(tracks, model):
+    """Motion at an edge, as the engine's exchanges rate it."""
+    d, (kind, F, Q) = tracks.detections, steps_of(model.motion, tracks.detections.times)
+    order, offsets = tracks.by_track
+    frame = d.frame_of.astype(np.int64)
+
+    def ratio(a, b, t):
+        rows = [order[offsets[k] : offsets[k + 1]] for k in (a, b)]
+        links = [np.searchsorted(frame[own], t) for own in rows]
+        linked = [0 < i < len(own) for i, own in zip(links, rows, strict=True)]
+        if not any(linked):
+            return 0.0
+        if not all(linked):
+            side = linked.index(True)
+            own, i = frame[rows[side]], links[side]
+            return -1.0 if own[i] - own[i - 1] > 4 else -np.inf
+        own = np.concatenate(rows)
+        return _engine.exchange_ratios(
+            motion_model(model, d.n_axes), d.times, kind, F, Q, np.ascontiguousarray(d.points[own]),
+            frame[own], np.array([0, len(rows[0]), len(own)]), np.array([t]), p_detection=0.9,
+        )[0]  # fmt: skip
+
+    return ratio
+
+
+@pytest.mark.parametrize("seed", range(sized(4, 1)))
+def test_stretches_are_those_of_the_reference(seed):
+    rng = np.random.default_rng(seed)
+    person = am.simulate.person(frames=160, seed=seed)
+    truth = am.simulate.corrupt(person, missing=0.15, noise=NOISE, seed=seed)
+    tracks = am.Tracks(detections=truth.detections, labels=truth.labels)
+    pairs = near_pairs(tracks)
+    for pair in pairs[rng.choice(len(pairs), 6, replace=False)]:
+        first, n = rng.integers(0, 140), rng.integers(5, 60)
+        tracks = exchanged(tracks, pair, range(first, first + n))
+    model = model_of(tracks.detections)
+    found = of_engine(tracks, model)
+    wanted = stretches(positions_of(tracks), NOISE, motion_of(tracks, model))
+    assert [f[:4] for f in found] == [w[:4] for w in wanted]
+    assert [f[4] for f in found] == pytest.approx([w[4] for w in wanted], abs=1e-6)
+    assert len(found) >= 2
+
+
+@pytest.mark.parametrize("edges", [(100, 160), (120,)])
+def test_an_exchange_is_undone(edges):
+    """Two markers of a segment are occluded together, and each comes back as the other."""
+    person = am.simulate.person(frames=300, seed=2)
+    pairs = near_pairs(person)[::9]
+    n_undone = 0
+    for pair in pairs:
+        frame = person.detections.frame_of
+        is_occluded = np.isin(frame, [t for edge in edges for t in range(edge - 25, edge)])
+        kept = ~(is_occluded & np.isin(person.labels, pair))
+        d = person.detections.keep(kept)
+        truth = am.Tracks(detections=d, labels=person.labels[kept])
+        wrong = exchanged(truth, pair, range(edges[0], edges[1] if len(edges) > 1 else 300))
+        labels, log_odds = exchanged_back(d, wrong.labels.astype(np.int64), model_of(d))
+        is_back = am.evaluate(am.Tracks(detections=d, labels=labels), truth).idf1 == 1
+        assert is_back or np.array_equal(labels, wrong.labels)
+        assert np.isfinite(log_odds).any() == is_back
+        n_undone += is_back
+    assert n_undone >= 0.8 * len(pairs)
+
+
+@pytest.mark.parametrize("seed", range(sized(4, 1)))
+@pytest.mark.parametrize("scene", ["person", "smooth", "fingers", "cube"])
+def test_right_tracks_are_left_alone(scene, seed):
+    options = {"n_markers": 20} if scene == "smooth" else {}
+    made = getattr(am.simulate, scene)(frames=200, seed=seed, **options)
+    truth = am.simulate.corrupt(made, missing=0.1, noise=NOISE, seed=seed)
+    labels = truth.labels.astype(np.int64)
+    again, log_odds = exchanged_back(truth.detections, labels, model_of(truth.detections))
+    assert np.array_equal(again, labels)
+    assert np.isinf(log_odds).all()
+
+
+def test_two_axes():
+    person = am.simulate.person(frames=200, seed=3)
+    d = person.detections
+    flat = am.Detections.from_frames(d.times, [d.frame(t)[:, [0, 2]] for t in range(d.n_frames)])
+    tracks = am.Tracks(detections=flat, labels=person.labels)
+    labels, _ = exchanged_back(flat, tracks.labels.astype(np.int64), model_of(flat))
+    assert np.array_equal(labels, tracks.labels)
+
+
+def test_a_stitching_with_exchanges_is_whole():
+    """Each part of a tracklet is a tracklet; each marker has one chain of them."""
+    person = am.simulate.person(frames=300, seed=2)
+    truth = am.simulate.corrupt(person, missing=0.05, noise=NOISE, seed=2)
+    tracks = am.Tracks(detections=truth.detections, labels=truth.labels)
+    positions = positions_of(tracks)
+    apart = [
+        (np.nanmin(np.linalg.norm(positions[:, a] - positions[:, b], axis=1)), a, b)
+        for a, b in near_pairs(tracks)
+    ]
+    model, found = model_of(truth.detections), None
+    for _, a, b in sorted(apart)[:12]:
+        wrong = exchanged(tracks, (a, b), range(150, 300))
+        stitching = am.stitch(wrong, model)
+        found = stitching if len(stitching.cuts) else found
+        for k in range(stitching.tracks.n_tracks):
+            own = np.flatnonzero(stitching.markers == k)
+            assert stitching.after[own].tolist() == [-1, *own[:-1]]
+        labels = np.append(np.maximum(stitching.markers, -1), -1)[stitching.tracklets]
+        assert np.array_equal(labels, stitching.tracks.labels)
+        first, _, n = stitching.extents
+        assert (np.diff(stitching.tracks.detections.frame_of[first]) >= 0).all()
+        assert (n > 0).all()
+        assert ((stitching.probabilities > 0) & (stitching.probabilities <= 1)).all()
+    assert found is not None
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"noise": -1.0},
+        {"p_detection": 1.0},
+        {"is_examined": np.ones(3, dtype=bool)},
+        {"points": np.full((4, 3), np.nan)},
+    ],
+)
+def test_the_engine_refuses_what_does_not_fit(changes):
+    d = am.simulate.cube(frames=20, seed=1).detections
+    model = model_of(d)
+    kind, F, Q = steps_of(model.motion, d.times)
+    given = {
+        "motion": motion_model(model, 3), "times": d.times, "kind": kind, "F": F, "Q": Q,
+        "points": np.zeros((4, 3)), "frames": np.array([0, 1, 0, 1]),
+        "offsets": np.array([0, 2, 4]), "is_examined": np.ones(2, dtype=bool),
+        "p_detection": 0.9, "noise": 0.001,
+    }  # fmt: skip
+    _engine.exchanged_stretches(**given)
+    with pytest.raises(ValueError, match=next(iter(changes))):
+        _engine.exchanged_stretches(**given | changes)
