@@ -169,8 +169,9 @@ def stitch(
     first.
 
     Three passes go through the capture, forward, backward and forward again; the joins of each
-    pass are prior information for the next. At the end two tracks are joined if one ends before the
-    other begins and both keep the same distances to other tracks.
+    pass are prior information for the next. At the end two tracks are joined if they are in no
+    frame together and keep the same distances to other tracks, and two tracks are exchanged where
+    these distances show that they have each other's marker.
 
     Short pure tracklets give the best result: limit the model's gap by `tracklet_model`, as
     `track` does.
