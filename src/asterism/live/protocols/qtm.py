@@ -45,7 +45,7 @@ __all__ = [
     "text_of",
 ]
 
-LONGEST = 16 * 2**20
+LONGEST = 4 * 2**20
 """Largest size of a packet that is accepted, bytes; a larger one is a lost boundary of packets."""
 _HEADER = 8
 _MM = 1000.0  # per metre
@@ -271,13 +271,15 @@ def split(buffer: bytearray, order: str = "<") -> tuple[int, memoryview] | None:
     Raises
     ------
     PacketError
-        If the size is impossible, so that the boundary of packets is lost.
+        If size or kind is impossible, so that the boundary of packets is lost.
     """
     if len(buffer) < _HEADER:
         return None
     size, kind = struct.unpack_from(f"{order}II", buffer)
     if not _HEADER <= size <= LONGEST:
         raise PacketError(f"a packet of {size} bytes")
+    if kind > max(Packet):
+        raise PacketError(f"a packet of kind {kind}")
     if len(buffer) < size:
         return None
     return kind, memoryview(buffer)[_HEADER:size]

@@ -10,6 +10,7 @@ import time
 import numpy as np
 
 from asterism.errors import SourceError, SourceLost
+from asterism.live.faults import Faults
 from asterism.live.frame import SourceFrame
 from asterism.live.protocols import qtm
 from asterism.live.protocols.packet_error import PacketError
@@ -40,7 +41,8 @@ class QtmSource:
         self.name, self._address = name, (host, port)
         self.rate = 0.0
         self.waits = False
-        self.faults: dict[str, int] = {}
+        self._faults = Faults(name)
+        self.faults: dict[str, int] = self._faults.counts
         self._socket: socket.socket | None = None
         self._received = bytearray()
         self._arrived = 0.0
@@ -150,8 +152,7 @@ class QtmSource:
             try:
                 return self._frame(found[1])
             except PacketError as error:
-                reason = str(error)
-                self.faults[reason] = self.faults.get(reason, 0) + 1
+                self._faults.undecoded(error)
 
     def _frame(self, body: bytes) -> SourceFrame:
         data = qtm.decode_data(body)
