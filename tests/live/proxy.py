@@ -1,4 +1,4 @@
-"""Proxies between a server and a source, which spoil the frames on their way, and their faults.
+"""Proxies between a server and a source, which inject faults into the frames on their way.
 
 A fault is a function of the packet of a frame; it returns the packets that go on instead. All other
 packets, such as commands and their answers, pass as they are.
@@ -49,7 +49,7 @@ class UdpProxy(Proxy):
             back.connect(("127.0.0.1", self.server_port))
             while not self._is_closing:
                 for ready in select.select([self._front, back], [], [], 0.05)[0]:
-                    with contextlib.suppress(OSError):  # nobody listens for a moment
+                    with contextlib.suppress(OSError):  # no server or no client for a moment
                         packet, address = ready.recvfrom(65_536)
                         if self.is_cut:
                             continue
