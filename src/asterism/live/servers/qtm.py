@@ -18,7 +18,13 @@ import asterism
 from asterism.errors import SinkError
 from asterism.live.protocols import qtm
 from asterism.live.protocols.packet_error import PacketError
-from asterism.live.protocols.qtm import Component, Event, Packet
+from asterism.live.protocols.qtm import Event, Packet
+from asterism.live.protocols.qtm_components import (
+    Component,
+    encode_markers,
+    encode_nothing,
+    encode_points,
+)
 from asterism.live.servers.listening import check_host, tcp_listener, udp_socket
 from asterism.live.servers.qtm_connection import Connection
 
@@ -309,9 +315,9 @@ def _component(kind: Component, order: str, frame: ServedFrame) -> bytes:
     match kind:
         case Component.MARKERS | Component.MARKERS_RESIDUAL:
             residuals = kind is Component.MARKERS_RESIDUAL
-            return qtm.encode_markers(frame.markers, residuals=residuals, order=order)
+            return encode_markers(frame.markers, residuals=residuals, order=order)
         case Component.POINTS | Component.POINTS_RESIDUAL:
             residuals = kind is Component.POINTS_RESIDUAL
-            return qtm.encode_points(frame.points, frame.ids, residuals=residuals, order=order)
+            return encode_points(frame.points, frame.ids, residuals=residuals, order=order)
         case _:
-            return qtm.encode_empty(kind, order)
+            return encode_nothing(kind, order)

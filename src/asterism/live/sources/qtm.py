@@ -14,7 +14,8 @@ from asterism.live.faults import Faults
 from asterism.live.frame import SourceFrame
 from asterism.live.protocols import qtm
 from asterism.live.protocols.packet_error import PacketError
-from asterism.live.protocols.qtm import Component, Packet
+from asterism.live.protocols.qtm import Packet
+from asterism.live.protocols.qtm_components import Component, decode_markers, decode_points
 from asterism.live.protocols.qtm_parameters import read_parameters
 
 __all__ = ["QtmSource"]
@@ -158,11 +159,11 @@ class QtmSource:
         data = qtm.decode_data(body)
         points: list[np.ndarray[tuple[int, int], np.dtype[np.float64]]] = []
         if Component.MARKERS in data.components:
-            markers = qtm.decode_markers(data.components[Component.MARKERS])
+            markers = decode_markers(data.components[Component.MARKERS])
             # All 32 bits set mark a marker that is not there.
             points.append(markers[~np.isnan(markers).all(axis=1)])
         if Component.POINTS in data.components:
-            points.append(qtm.decode_points(data.components[Component.POINTS])[0])
+            points.append(decode_points(data.components[Component.POINTS])[0])
         return SourceFrame(
             number=data.number,
             time=data.time,
