@@ -148,3 +148,13 @@ def test_frames_that_are_dropped_from_a_burst_are_no_jump_of_the_clock():
     assert counts == {"lost": 393}
     assert missing[-2:] == [393, 0]
     np.testing.assert_allclose(times, [*np.arange(7) * PERIOD, 4.0, 4.01])
+
+
+def test_frames_that_are_dropped_here_are_not_lost():
+    faults = Faults("test")
+    intake = Intake(faults, SourceClock())
+    intake.take(frame(0))
+    intake.dropped(4)  # frames 2 to 5: the queue drops them while frame 1 is taken
+    for n in (1, 6, 8):
+        assert intake.take(frame(n)) is not None
+    assert faults.counts == {"lost": 1}

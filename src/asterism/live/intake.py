@@ -117,7 +117,8 @@ class Intake:
         step = frame.time - last.time
         if (n_lost := n_steps - 1 - self._n_dropped) > 0:
             self._faults.add("lost", "frames are missing", n_lost)
-        self._n_dropped = 0
+        # A frame may be dropped behind the one that is taken now.
+        self._n_dropped = max(-n_lost, 0)
         period = self.period if math.isfinite(self.period) else 0.01
         if not math.isfinite(step) or -MAX_JUMP < step <= 0:
             self._faults.add("bad_times", "a time stamp does not advance; the frame rate is used")
