@@ -86,8 +86,8 @@ def send(address: str, rate: float, sent: SynchronizedArray[float], begin: Any) 
     sink.close()
 
 
-def receive(address: str, got: SynchronizedArray[float], begin: Any) -> None:
-    """Receive labelled frames, and note when."""
+def receive(address: str, got: SynchronizedArray[float], begin: Any, silence: float = 3.0) -> None:
+    """Receive labelled frames, and note when, until none has come for so many seconds."""
     source = parse_source(address)
     while True:
         try:
@@ -104,7 +104,7 @@ def receive(address: str, got: SynchronizedArray[float], begin: Any) -> None:
             break
         if frame is not None and frame.number < len(got):
             got[frame.number] = frame.received
-            last = time.perf_counter() + 3
+            last = time.perf_counter() + silence
 
 
 def wait_for(address: str) -> None:

@@ -129,6 +129,7 @@ def natnetsdk(count: Count, port: int, version: str) -> None:
         own = frame.marker_set_data.marker_data_list[0].marker_pos_list
         others = frame.legacy_other_markers.marker_pos_list
         count.take(number, [(own, markers), (others, points)], 1.0)
+        frame.get_as_string = str  # the client makes a text of every frame, printed or not
         return at, frame
 
     client._NatNetClient__unpack_mocap_data = noted

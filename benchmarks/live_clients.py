@@ -176,7 +176,9 @@ def main() -> None:
             if not is_there(client):
                 rows.append([client, "not installed", *[""] * 5])
                 continue
-            rows += [measure(client, version, args.frames, folder) for version in CLIENTS[client]]
+            for version in CLIENTS[client]:
+                rows.append(measure(client, version, args.frames, folder))
+                print(*rows[-1], flush=True)
     head = ["Client", "Version", "Sent", "Received", "Different", "Dropped", "Frames/s"]
     foot = f"60 markers and 5 other points a frame, over loopback. {conditions()}."
     publish([*table(head, rows), "", foot], args.markdown)

@@ -138,3 +138,23 @@ def test_a_file_has_no_arrivals_that_tell_the_time():
     _, times, _, counts = taken(given, in_real_time=False)
     assert counts == {}
     assert times[5] == pytest.approx(5.05)
+
+
+def test_frames_that_are_dropped_from_a_burst_are_no_jump_of_the_clock():
+    # The numbers of the frames state how much time has passed, not their arrivals.
+    given = [frame(n) for n in range(5)]
+    given += [frame(n, received=60 + 1e-4 * n) for n in (5, 6, 400, 401)]
+    _, times, missing, counts = taken(given)
+    assert counts == {"lost": 393}
+    assert missing[-2:] == [393, 0]
+    np.testing.assert_allclose(times, [*np.arange(7) * PERIOD, 4.0, 4.01])
+
+
+def test_frames_that_are_dropped_here_are_not_lost():
+    faults = Faults("test")
+    intake = Intake(faults, SourceClock())
+    intake.take(frame(0))
+    intake.dropped(4)  # frames 2 to 5: the queue drops them while frame 1 is taken
+    for n in (1, 6, 8):
+        assert intake.take(frame(n)) is not None
+    assert faults.counts == {"lost": 1}

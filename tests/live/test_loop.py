@@ -13,6 +13,7 @@ import pytest
 import asterism as am
 from asterism.errors import SinkError, SourceError
 from asterism.tracking import Stitched
+from tests.live.judged import judged
 from tests.live.sources import LOST, Kept, Memory, Unreachable, frames_of, with_faults
 
 RATE = 100.0
@@ -34,26 +35,6 @@ def followed(items, model, *, method=None, **options):
     run = am.live.run(source, [sink], model=model, method=method, **options)
     assert not sink.is_open
     return run, sink.frames
-
-
-def tracks_of(frames):
-    """Tracks of what a sink has received."""
-    times = [f.time for f in frames]
-    d = am.Detections.from_frames(times, [f.points for f in frames])
-    labels = np.concatenate([f.labels for f in frames])
-    _, ids = np.unique(labels[labels >= 0], return_inverse=True)
-    dense = labels.copy()
-    dense[labels >= 0] = ids
-    return am.Tracks(detections=d, labels=dense)
-
-
-def judged(frames, made):
-    """Scores against the truth, of the frames of a scene that have arrived."""
-    kept = [f.number for f in frames]
-    d = made.detections
-    truth = am.Tracks.from_dense(d.times[kept], made.positions()[kept])
-    found = tracks_of([dataclasses.replace(f, time=float(d.times[f.number])) for f in frames])
-    return am.evaluate(found, truth)
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,17 @@ from hypothesis.extra.numpy import arrays
 
 from asterism.live.protocols import qtm
 from asterism.live.protocols.packet_error import PacketError
-from asterism.live.protocols.qtm import Component, Event, Packet
+from asterism.live.protocols.qtm import Event, Packet
 from asterism.live.protocols.qtm_commands import read_components, read_stream_request
+from asterism.live.protocols.qtm_components import (
+    Component,
+    decode_2d,
+    decode_markers,
+    decode_points,
+    encode_markers,
+    encode_nothing,
+    encode_points,
+)
 from asterism.live.protocols.qtm_parameters import SECTIONS, encode_parameters, read_parameters
 
 ORDERS = st.sampled_from("<>")
@@ -30,9 +39,9 @@ def test_frames_are_decoded_as_they_were_encoded(places, order, residuals, numbe
     markers = np.where(missing[:, None], np.nan, places)
     ids = data.draw(arrays(np.int64, len(places), elements=st.integers(0, 2**32 - 1)))
     parts = [
-        qtm.encode_markers(markers, residuals=residuals, order=order),
-        qtm.encode_points(places, ids, residuals=residuals, order=order),
-        qtm.encode_empty(Component.SKELETON, order),
+        encode_markers(markers, residuals=residuals, order=order),
+        encode_points(places, ids, residuals=residuals, order=order),
+        encode_nothing(Component.SKELETON, order),
     ]
     packet = bytearray(qtm.encode_data(12.5, number, parts, order))
     kind, body = qtm.split(packet, order)
@@ -44,16 +53,16 @@ def test_frames_are_decoded_as_they_were_encoded(places, order, residuals, numbe
         if residuals
         else (Component.MARKERS, Component.POINTS)
     )
-    got = qtm.decode_markers(found.components[at[0]], residuals=residuals, order=order)
+    got = decode_markers(found.components[at[0]], residuals=residuals, order=order)
     np.testing.assert_array_equal(got, markers)
-    got, got_ids = qtm.decode_points(found.components[at[1]], residuals=residuals, order=order)
+    got, got_ids = decode_points(found.components[at[1]], residuals=residuals, order=order)
     np.testing.assert_array_equal(got, places)
     np.testing.assert_array_equal(got_ids, ids)
 
 
 def test_missing_markers_have_all_bits_set():
     # Clients compare the 32 bits; another NaN would be a marker to them.
-    packet = qtm.encode_markers(np.array([[np.nan] * 3, [1.0, 2.0, 3.0]]))
+    packet = encode_markers(np.array([[np.nan] * 3, [1.0, 2.0, 3.0]]))
     assert packet[16:28] == b"\xff" * 12
     assert struct.unpack("<3f", packet[28:40]) == (1000.0, 2000.0, 3000.0)
 
@@ -61,7 +70,7 @@ def test_missing_markers_have_all_bits_set():
 @given(st.binary(max_size=200), ORDERS)
 def test_garbage_raises_only_the_error_of_packets(data, order):
     readers = (
-        qtm.decode_data, qtm.decode_markers, qtm.decode_points, qtm.decode_2d,
+        qtm.decode_data, decode_markers, decode_points, decode_2d,
     )  # fmt: skip
     for read in readers:
         with contextlib.suppress(PacketError):
@@ -78,7 +87,7 @@ def test_garbage_raises_only_the_error_of_packets(data, order):
 
 @given(st.integers(0, 10**6), st.integers(0, 10**6))
 def test_truncated_and_altered_packets(cut, change):
-    parts = [qtm.encode_points(np.ones((5, 3)), np.arange(5)), qtm.encode_markers(np.ones((4, 3)))]
+    parts = [encode_points(np.ones((5, 3)), np.arange(5)), encode_markers(np.ones((4, 3)))]
     body = qtm.encode_data(1.0, 7, parts)[8:]
     with pytest.raises(PacketError):
         qtm.decode_data(body[: cut % len(body)])
@@ -86,13 +95,13 @@ def test_truncated_and_altered_packets(cut, change):
     altered[change % len(body)] ^= 0xFF
     with contextlib.suppress(PacketError):
         for kind, part in qtm.decode_data(altered).components.items():
-            read = qtm.decode_markers if kind == Component.MARKERS else qtm.decode_points
+            read = decode_markers if kind == Component.MARKERS else decode_points
             read(part)
 
 
 def test_image_points_of_cameras():
     camera = struct.pack("<Ib", 2, 0) + struct.pack("<iihhiihh", 64, -128, 5, 6, 1, 2, 3, 4)
-    cameras = qtm.decode_2d(struct.pack("<IHH", 2, 0, 0) + camera + struct.pack("<Ib", 0, 1))
+    cameras = decode_2d(struct.pack("<IHH", 2, 0, 0) + camera + struct.pack("<Ib", 0, 1))
     assert [c.tolist() for c in cameras] == [[[64, -128], [1, 2]], []]
 
 
@@ -110,10 +119,10 @@ def test_packets_are_split_wherever_they_are_cut():
     assert found == [(1, b"version 1.25\0"), (6, b"\x01")]
 
 
-@pytest.mark.parametrize("size", [0, 7, 2**31])
-def test_an_impossible_size_is_refused(size):
+@pytest.mark.parametrize(("size", "kind"), [(0, 1), (7, 1), (2**31, 1), (100, 9), (100, 2**30)])
+def test_a_lost_boundary_of_packets_is_noticed(size, kind):
     with pytest.raises(PacketError):
-        qtm.split(bytearray(struct.pack("<II", size, 1)))
+        qtm.split(bytearray(struct.pack("<II", size, kind)))
 
 
 @given(st.lists(st.text(st.characters(codec="utf-8"), min_size=1)))

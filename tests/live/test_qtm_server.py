@@ -12,7 +12,8 @@ import pytest
 from asterism.errors import ParameterError, SinkError
 from asterism.live import QtmServer
 from asterism.live.protocols import qtm
-from asterism.live.protocols.qtm import Component, Event, Packet
+from asterism.live.protocols.qtm import Event, Packet
+from asterism.live.protocols.qtm_components import Component, decode_markers, decode_points
 from asterism.live.protocols.qtm_parameters import read_parameters
 from tests.live.served import NAMES, Client, qtm_server, served_frames, until
 
@@ -82,8 +83,8 @@ def test_frames_in_both_byte_orders(order):
                 data = qtm.decode_data(body, order)
                 assert data.number == frame.number
                 assert data.time == round(frame.time * 1e6) / 1e6
-                markers = qtm.decode_markers(data.components[1], order=order)
-                points, ids = qtm.decode_points(data.components[10], residuals=True, order=order)
+                markers = decode_markers(data.components[1], order=order)
+                points, ids = decode_points(data.components[10], residuals=True, order=order)
                 want = (frame.markers * 1000).astype(np.float32)
                 np.testing.assert_array_equal((markers * 1000).astype(np.float32), want)
                 want = (frame.points * 1000).astype(np.float32)

@@ -19,6 +19,7 @@ from asterism.errors import ParameterError
 from asterism.live import NatNetServer, QtmServer, serve
 from asterism.live.protocols import qtm
 from asterism.live.protocols.qtm import Packet
+from asterism.live.protocols.qtm_components import decode_markers, decode_points
 from asterism.live.protocols.qtm_parameters import read_parameters
 from asterism.live.sources.natnet import NatNetSource
 from asterism.live.sources.qtm import QtmSource
@@ -50,10 +51,10 @@ def test_labelled_markers_with_their_names():
         for t in range(60):
             data = qtm.decode_data(client.next()[1])
             assert (data.number, data.time) == (t + 1, pytest.approx(d.times[t], abs=1e-6))
-            markers = qtm.decode_markers(data.components[1])
+            markers = decode_markers(data.components[1])
             np.testing.assert_allclose(markers, positions[t], atol=1e-6)
             clutter = d.frame(t)[corrupted.labels[d.offsets[t] : d.offsets[t + 1]] < 0]
-            points, _ = qtm.decode_points(data.components[2])
+            points, _ = decode_points(data.components[2])
             np.testing.assert_allclose(points, clutter, atol=1e-6)
         assert client.next() == (Packet.NO_MORE_DATA, b"")
     thread.join()
@@ -80,7 +81,7 @@ def test_the_identities_of_points_without_labels_say_nothing():
     with Client(server.port) as client:
         client.send("StreamFrames AllFrames 3DNoLabels")
         ids = [
-            qtm.decode_points(qtm.decode_data(client.next()[1]).components[2])[1].tolist()
+            decode_points(qtm.decode_data(client.next()[1]).components[2])[1].tolist()
             for _ in range(60)
         ]
     thread.join()

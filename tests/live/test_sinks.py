@@ -20,6 +20,7 @@ from asterism.errors import ParameterError, SinkError
 from asterism.live import LiveFrame, StreamHeader
 from asterism.live.protocols import qtm
 from asterism.live.protocols.qtm import Event, Packet
+from asterism.live.protocols.qtm_components import decode_markers, decode_points
 from asterism.live.protocols.qtm_parameters import read_parameters
 from asterism.live.servers.qtm import QtmServer
 from asterism.live.sinks.lsl import LslSink
@@ -59,14 +60,14 @@ def test_servers_keep_every_marker_at_its_place():
         sink.send(frame)
         data = qtm.decode_data(client.next()[1])
         assert (data.number, data.time) == (8, 0.08)
-        markers = qtm.decode_markers(data.components[1])
+        markers = decode_markers(data.components[1])
         np.testing.assert_array_equal(markers, [frame.points[3], frame.points[0], [math.nan] * 3])
-        points, ids = qtm.decode_points(data.components[2])
+        points, ids = decode_points(data.components[2])
         np.testing.assert_array_equal(points, frame.points[1:3])
         assert ids.tolist() == [8, 0]  # its track plus 1, and 0 for clutter
         sink.send(live_frame(9, ("D", "C", None, "A")))
         assert client.next() == (Packet.EVENT, bytes([Event.CAMERA_SETTINGS_CHANGED]))
-        markers = qtm.decode_markers(qtm.decode_data(client.next()[1]).components[1])
+        markers = decode_markers(qtm.decode_data(client.next()[1]).components[1])
         assert np.isnan(markers[:, 0]).tolist() == [False, True, False, False]
         assert read_parameters(client.ask("GetParameters 3D")[1]).names == ("A", "B", "C", "D")
         sink.close()

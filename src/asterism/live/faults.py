@@ -31,6 +31,10 @@ class Faults:
         self._name = name
         self.counts: Counter[str] = Counter()
 
+    def undecoded(self, error: Exception) -> None:
+        """Count a packet that a source cannot decode."""
+        self.add("undecoded", f"a packet cannot be decoded and is ignored ({error})")
+
     def add(self, kind: str, reason: str, n: int = 1) -> None:
         """Count a fault, and log its reason at the first time.
 

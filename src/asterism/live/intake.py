@@ -117,14 +117,17 @@ class Intake:
         step = frame.time - last.time
         if (n_lost := n_steps - 1 - self._n_dropped) > 0:
             self._faults.add("lost", "frames are missing", n_lost)
-        self._n_dropped = 0
+        # A frame may be dropped behind the one that is taken now.
+        self._n_dropped = max(-n_lost, 0)
+        period = self.period if math.isfinite(self.period) else 0.01
         if not math.isfinite(step) or -MAX_JUMP < step <= 0:
             self._faults.add("bad_times", "a time stamp does not advance; the frame rate is used")
-            period = self.period if math.isfinite(self.period) else 0.01
             return self._accept(replace(frame, time=last.time + n_steps * period),
                                 self._time + n_steps * period, n_steps - 1)  # fmt: skip
-        waited = frame.received - last.received
-        if step <= -MAX_JUMP or (self._in_real_time and step > waited + MAX_JUMP):
+        # Frames that have waited arrive in a burst. Some of them may be dropped; their numbers say
+        # how much time has passed.
+        passed = max(frame.received - last.received, n_steps * period)
+        if step <= -MAX_JUMP or (self._in_real_time and step > passed + MAX_JUMP):
             self._faults.add("clock_jumps", "the clock of the source jumps; arrivals are used")
             return self._accept(frame, self._by_arrival(frame, last), 0, is_new_clock=True)
         if n_steps == 1 or not math.isfinite(self.period):

@@ -22,6 +22,7 @@ from asterism.live.low_latency import low_latency
 from asterism.live.queue import FrameQueue
 from asterism.live.receiver import Connected, Disconnected, Ended, Receiver
 from asterism.live.sinks.page import PageSink
+from asterism.tracking.stitching import MAX_TRACKLET_GAP
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -160,8 +161,10 @@ class LiveLoop:
                     continue
                 accepted = intake.take(item)
                 if accepted is not None:
-                    # Frames that are missing are tracked as empty ones only if there is time.
-                    if not waits and perf_counter() - item.received > BEHIND:
+                    # Missing frames are tracked as empty ones. While tracking is behind, that is
+                    # left out for gaps that end no tracklet.
+                    is_behind = not waits and perf_counter() - item.received > BEHIND
+                    if is_behind and accepted.n_missing <= MAX_TRACKLET_GAP:
                         accepted = accepted._replace(n_missing=0)
                     self._track(accepted, intake.period)
             elif isinstance(item, Ended):

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from asterism.live.sinks.server import Server
+    from asterism.live.servers.base import Server
 
 __all__ = ["serve"]
 

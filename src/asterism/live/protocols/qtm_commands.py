@@ -6,7 +6,7 @@ import re
 from typing import NamedTuple
 
 from asterism.live.protocols.packet_error import PacketError
-from asterism.live.protocols.qtm import COMPONENTS, Component
+from asterism.live.protocols.qtm_components import COMPONENTS, Component
 
 __all__ = ["FrameRequest", "read_components", "read_stream_request"]
 

@@ -7,7 +7,6 @@ the last minute. A frame that a socket does not take at once is dropped for that
 
 from __future__ import annotations
 
-import logging
 import math
 import select
 import socket
@@ -32,14 +31,13 @@ from asterism.live.protocols.natnet_messages import (
     wanted_version,
 )
 from asterism.live.protocols.packet_error import PacketError
+from asterism.live.servers.base import Server
 from asterism.live.servers.listening import check_host, udp_socket
 
 if TYPE_CHECKING:
     from asterism.live.servers.served_frame import ServedFrame
 
 __all__ = ["DATA_PORT", "GROUP", "PORT", "NatNetServer"]
-
-log = logging.getLogger(__name__)
 
 PORT, DATA_PORT, GROUP = 1510, 1511, "239.255.42.99"
 """Usual port of commands, port of multicast frames, and multicast group."""
@@ -48,7 +46,7 @@ _ALIVE_SECONDS = 60.0
 _MAX_CLIENTS = 100
 
 
-class NatNetServer:
+class NatNetServer(Server):
     """Server of frames for clients of Motive.
 
     Parameters
@@ -106,20 +104,13 @@ class NatNetServer:
             raise ParameterError("version", f"one of {known}", version)
         if multicast and not 224 <= int(check_host(multicast).split(".")[0]) <= 239:
             raise ParameterError("multicast", f"a multicast group, such as {GROUP}", multicast)
-        self.host, self.port = check_host(host), port
-        self.names, self.rate = names, rate
-        self.faults: dict[str, int] = {}
+        super().__init__(host, port, names, rate)
         self._marker_set, self._version = marker_set, version
         self._multicast, self._data_port = multicast, data_port
         self._clients: dict[tuple[str, int], tuple[tuple[int, int], float]] = {}
         self._lock = threading.Lock()
-        self._asked = threading.Event()
         self._thread: threading.Thread | None = None
         self._latest: ServedFrame | None = None
-
-    def __repr__(self) -> str:
-        n, k = len(self.names), self.n_clients
-        return f"NatNetServer({self.host}:{self.port}, {n} markers, {k} clients)"
 
     @property
     def n_clients(self) -> int:
@@ -146,10 +137,6 @@ class NatNetServer:
         self._waker, self._woken = socket.socketpair()
         self._thread = threading.Thread(target=self._serve, name="natnet-server", daemon=True)
         self._thread.start()
-
-    def wait_for_client(self, timeout: float) -> bool:
-        """Wait until a client has connected; return whether one has."""
-        return self._asked.wait(timeout)
 
     def rename(self, names: tuple[str, ...]) -> None:
         """Change the names; clients see the number of markers change and ask for them."""
@@ -206,9 +193,6 @@ class NatNetServer:
             self._socket.sendto(packet, address)
         except OSError:
             self._count("UDP not sent")
-
-    def _count(self, reason: str) -> None:
-        self.faults[reason] = self.faults.get(reason, 0) + 1
 
     def _serve(self) -> None:
         """Answer messages, until the server is closed."""

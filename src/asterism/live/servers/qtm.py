@@ -18,8 +18,15 @@ import asterism
 from asterism.errors import SinkError
 from asterism.live.protocols import qtm
 from asterism.live.protocols.packet_error import PacketError
-from asterism.live.protocols.qtm import Component, Event, Packet
-from asterism.live.servers.listening import check_host, tcp_listener, udp_socket
+from asterism.live.protocols.qtm import Event, Packet
+from asterism.live.protocols.qtm_components import (
+    Component,
+    encode_markers,
+    encode_nothing,
+    encode_points,
+)
+from asterism.live.servers.base import Server
+from asterism.live.servers.listening import tcp_listener, udp_socket
 from asterism.live.servers.qtm_connection import Connection
 
 if TYPE_CHECKING:
@@ -39,7 +46,7 @@ _SEND_BUFFER = 128 * 1024  # bytes; a larger one would only delay the frames of 
 _LONGEST_DATAGRAM = 65_507  # bytes
 
 
-class QtmServer:
+class QtmServer(Server):
     """Server of frames for clients of Qualisys Track Manager.
 
     Parameters
@@ -82,22 +89,16 @@ class QtmServer:
         is_replay: bool = False,
         discovery_port: int = DISCOVERY_PORT,
     ) -> None:
-        self.host, self.port, self.big_port = check_host(host), port, port + 1 if port else 0
-        self.names, self.rate = names, rate
-        self.faults: dict[str, int] = {}
+        super().__init__(host, port, names, rate)
+        self.big_port = port + 1 if port else 0
         self._discovery_port = discovery_port
         self._running = Event.RT_FROM_FILE_STARTED if is_replay else Event.CONNECTED
         self._ended = Event.RT_FROM_FILE_STOPPED if is_replay else Event.CONNECTION_CLOSED
         self._state = self._running
         self._clients: list[Connection] = []
         self._lock = threading.Lock()
-        self._asked = threading.Event()
         self._thread: threading.Thread | None = None
         self._is_closing = False
-
-    def __repr__(self) -> str:
-        n, k = len(self.names), self.n_clients
-        return f"QtmServer({self.host}:{self.port}, {n} markers, {k} clients)"
 
     @property
     def n_clients(self) -> int:
@@ -137,10 +138,6 @@ class QtmServer:
         self._is_closing = False
         self._thread = threading.Thread(target=self._serve, name="qtm-server", daemon=True)
         self._thread.start()
-
-    def wait_for_client(self, timeout: float) -> bool:
-        """Wait until a client has asked for frames; return whether one has."""
-        return self._asked.wait(timeout)
 
     def rename(self, names: tuple[str, ...]) -> None:
         """Change the labels, and let clients know that they must read them again."""
@@ -212,9 +209,6 @@ class QtmServer:
             self._udp.sendto(packet, target)
         except OSError:
             self._count("UDP not sent")
-
-    def _count(self, reason: str) -> None:
-        self.faults[reason] = self.faults.get(reason, 0) + 1
 
     def _wake(self) -> None:
         try:
@@ -309,9 +303,9 @@ def _component(kind: Component, order: str, frame: ServedFrame) -> bytes:
     match kind:
         case Component.MARKERS | Component.MARKERS_RESIDUAL:
             residuals = kind is Component.MARKERS_RESIDUAL
-            return qtm.encode_markers(frame.markers, residuals=residuals, order=order)
+            return encode_markers(frame.markers, residuals=residuals, order=order)
         case Component.POINTS | Component.POINTS_RESIDUAL:
             residuals = kind is Component.POINTS_RESIDUAL
-            return qtm.encode_points(frame.points, frame.ids, residuals=residuals, order=order)
+            return encode_points(frame.points, frame.ids, residuals=residuals, order=order)
         case _:
-            return qtm.encode_empty(kind, order)
+            return encode_nothing(kind, order)

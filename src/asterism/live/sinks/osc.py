@@ -8,16 +8,15 @@ metres (floats).
 from __future__ import annotations
 
 import re
-import socket
 import struct
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.errors import SinkError
+from asterism.live.sinks.datagrams import DatagramSink
 
 if TYPE_CHECKING:
-    from asterism.live.frame import LiveFrame, StreamHeader
+    from asterism.live.frame import LiveFrame
 
 __all__ = ["OscSink"]
 
@@ -26,7 +25,7 @@ _LONGEST = 60_000  # bytes of a bundle; a larger frame is sent as several
 _MAX_HEADS = 10_000
 
 
-class OscSink:
+class OscSink(DatagramSink):
     """Sink of Open Sound Control messages.
 
     Parameters
@@ -38,26 +37,11 @@ class OscSink:
     """
 
     def __init__(self, name: str, host: str, port: int) -> None:
-        self.name, self._target = name, (host, port)
-        self.faults: dict[str, int] = {}
-        self._socket: socket.socket | None = None
+        super().__init__(name, host, port)
         self._heads: dict[str | int, bytes] = {}
-
-    def open(self, header: StreamHeader) -> None:
-        """Open the socket.
-
-        Raises
-        ------
-        SinkError
-            If the host is unknown.
-        """
-        del header
-        self._socket = connected(self.name, self._target)
 
     def send(self, frame: LiveFrame) -> None:
         """Send a frame."""
-        if self._socket is None:
-            return
         number = (frame.number + 2**31) % 2**32 - 2**31
         first = _padded("/asterism/frame") + _padded(",id") + struct.pack(">id", number, frame.time)
         parts, size = [_BUNDLE, _sized(first)], 0
@@ -74,12 +58,6 @@ class OscSink:
         if len(parts) > 1:
             self._send(b"".join(parts))
 
-    def close(self) -> None:
-        """Close the socket."""
-        if self._socket is not None:
-            self._socket.close()
-            self._socket = None
-
     def _head(self, of: str | int) -> bytes:
         """Return size, address and types of the message of a marker or of a track."""
         if of not in self._heads:
@@ -91,31 +69,6 @@ class OscSink:
             head = _padded(f"/asterism/{kind}/{text}") + _padded(",fff")
             self._heads[of] = struct.pack(">i", len(head) + 12) + head
         return self._heads[of]
-
-    def _send(self, packet: bytes) -> None:
-        assert self._socket is not None
-        try:
-            self._socket.send(packet)
-        except OSError:
-            self.faults["UDP not sent"] = self.faults.get("UDP not sent", 0) + 1
-
-
-def connected(name: str, target: tuple[str, int]) -> socket.socket:
-    """Return a UDP socket that sends to a target and never blocks.
-
-    Raises
-    ------
-    SinkError
-        If the host is unknown.
-    """
-    made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    try:
-        made.connect(target)
-    except OSError as error:
-        made.close()
-        raise SinkError(f"{name}: {error.strerror or error}. Check the host.") from error
-    made.setblocking(False)
-    return made
 
 
 def _padded(text: str) -> bytes:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,47 +10,9 @@ from asterism.live.servers.served_frame import ServedFrame
 
 if TYPE_CHECKING:
     from asterism.live.frame import LiveFrame, StreamHeader
+    from asterism.live.servers.base import Server
 
-__all__ = ["Server", "ServerSink", "served"]
-
-
-class Server(Protocol):
-    """What the servers of all protocols have in common."""
-
-    names: tuple[str, ...]
-    rate: float
-    faults: dict[str, int]
-    host: str
-    port: int
-
-    @property
-    def n_clients(self) -> int:
-        """Number of clients."""
-        ...
-
-    def start(self) -> None:
-        """Listen."""
-        ...
-
-    def wait_for_client(self, timeout: float) -> bool:
-        """Wait until a client wants frames."""
-        ...
-
-    def rename(self, names: tuple[str, ...]) -> None:
-        """Change the names of the markers."""
-        ...
-
-    def send(self, frame: ServedFrame) -> None:
-        """Send a frame to all clients."""
-        ...
-
-    def finish(self) -> None:
-        """Report the end to all clients."""
-        ...
-
-    def close(self) -> None:
-        """Stop listening."""
-        ...
+__all__ = ["ServerSink", "served"]
 
 
 class ServerSink:

@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, ClassVar
 from asterism.checks import check_extra
 from asterism.errors import SinkError
 from asterism.live.protocols.json_lines import encode_line
-from asterism.live.sinks.osc import connected
+from asterism.live.sinks.datagrams import DatagramSink
 
 if TYPE_CHECKING:
-    import socket
     from pathlib import Path
 
     from asterism.live.frame import LiveFrame, StreamHeader
@@ -102,7 +101,7 @@ class CsvSink(JsonFileSink):
         written(self, self._file, "".join(lines or [f"{head},,,-1,\n"]).encode())
 
 
-class JsonUdpSink:
+class JsonUdpSink(DatagramSink):
     """Sink that sends each JSON line as a datagram.
 
     Parameters
@@ -115,35 +114,11 @@ class JsonUdpSink:
 
     def __init__(self, name: str, host: str, port: int) -> None:
         check_extra(name, "live", "orjson")
-        self.name, self._target = name, (host, port)
-        self.faults: dict[str, int] = {}
-        self._socket: socket.socket | None = None
-
-    def open(self, header: StreamHeader) -> None:
-        """Open the socket.
-
-        Raises
-        ------
-        SinkError
-            If the host is unknown.
-        """
-        del header
-        self._socket = connected(self.name, self._target)
+        super().__init__(name, host, port)
 
     def send(self, frame: LiveFrame) -> None:
         """Send a frame."""
-        if self._socket is None:
-            return
-        try:
-            self._socket.send(encode_line(frame))
-        except OSError:
-            self.faults["UDP not sent"] = self.faults.get("UDP not sent", 0) + 1
-
-    def close(self) -> None:
-        """Close the socket."""
-        if self._socket is not None:
-            self._socket.close()
-            self._socket = None
+        self._send(encode_line(frame))
 
 
 class StandardOutput:

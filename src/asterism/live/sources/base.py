@@ -30,7 +30,7 @@ class Source(Protocol):
         Whether the source waits while tracking is behind, as a file does. Otherwise late frames are
         dropped.
     faults : dict of str to int
-        Number of messages that could not be decoded and were ignored, by reason.
+        Number of packets that could not be decoded and were ignored, as `Faults.undecoded` counts.
     """
 
     name: str

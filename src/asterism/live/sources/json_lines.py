@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from asterism.checks import check_extra
 from asterism.errors import SourceError, SourceLost
+from asterism.live.faults import Faults
 from asterism.live.frame import SourceFrame
 from asterism.live.protocols.json_lines import LONGEST, decode_line
 from asterism.live.protocols.packet_error import PacketError
@@ -43,7 +44,8 @@ class UdpSource:
         self.name, self._address = name, (host, port)
         self.rate = 0.0
         self.waits = False
-        self.faults: dict[str, int] = {}
+        self._faults = Faults(name)
+        self.faults: dict[str, int] = self._faults.counts
         self._socket: socket.socket | None = None
         self._lines: list[tuple[bytes, float]] = []
 
@@ -85,7 +87,7 @@ class UdpSource:
         while True:
             while self._lines:
                 line, arrived = self._lines.pop(0)
-                if (frame := decoded(line, arrived, self.faults)) is not None:
+                if (frame := decoded(line, arrived, self._faults)) is not None:
                     return frame
             left = max(0.0, end - time.monotonic())
             if not select.select([self._socket], [], [], left)[0]:
@@ -116,7 +118,8 @@ class StandardInput:
         self.name = "-"
         self.rate = 0.0
         self.waits = True  # as a pipe does
-        self.faults: dict[str, int] = {}
+        self._faults = Faults(self.name)
+        self.faults: dict[str, int] = self._faults.counts
         self._stream = stream
         self._lines: queue.Queue[tuple[bytes, float] | None] = queue.Queue(_QUEUE)
         self._thread: threading.Thread | None = None
@@ -144,7 +147,7 @@ class StandardInput:
                 return None
             if item is None:
                 self._is_over = True
-            elif (frame := decoded(*item, self.faults)) is not None:
+            elif (frame := decoded(*item, self._faults)) is not None:
                 return frame
         raise EndOfSource(self.name)
 
@@ -161,11 +164,11 @@ class StandardInput:
         self._lines.put(None)
 
 
-def decoded(line: bytes, arrived: float, faults: dict[str, int]) -> SourceFrame | None:
+def decoded(line: bytes, arrived: float, faults: Faults) -> SourceFrame | None:
     """Return the frame of a line; a line that is none is counted."""
     try:
         number, seconds, points = decode_line(line)
     except PacketError as error:
-        faults[str(error)] = faults.get(str(error), 0) + 1
+        faults.undecoded(error)
         return None
     return SourceFrame(number=number, time=seconds, points=points, received=arrived)

@@ -11,6 +11,7 @@ from collections import deque
 from typing import TYPE_CHECKING
 
 from asterism.errors import SourceError, SourceLost
+from asterism.live.faults import Faults
 from asterism.live.frame import SourceFrame
 from asterism.live.protocols.natnet import (
     OCCLUDED,
@@ -32,6 +33,7 @@ __all__ = ["NatNetSource", "points_of"]
 
 _CONNECT_SECONDS, _TRIES = 1.0, 5
 _ALIVE_SECONDS = 1.0  # between messages that keep a unicast client subscribed
+_RESTART_SECONDS = 0.5  # without a frame, after which the server may have been started anew
 _SILENT_SECONDS = 5.0  # without any packet, after which the server counts as lost
 _READ = 65_536
 _EARLY = 1024  # frames that may arrive while the source connects
@@ -61,12 +63,13 @@ class NatNetSource:
         self._local, self._multicast = local, multicast
         self.rate = 0.0
         self.waits = False
-        self.faults: dict[str, int] = {}
+        self._faults = Faults(name)
+        self.faults: dict[str, int] = self._faults.counts
         self._command: socket.socket | None = None
         self._data: socket.socket | None = None
         self._version = VERSIONS[-1]
         self._early: deque[tuple[bytes, float]] = deque(maxlen=_EARLY)
-        self._kept_alive = self._heard = 0.0
+        self._kept_alive = self._heard = self._last_frame = 0.0
 
     def open(self) -> None:
         """Connect and agree on a version.
@@ -103,7 +106,7 @@ class NatNetSource:
         except SourceError:
             self.close()
             raise
-        self._kept_alive = self._heard = time.monotonic()
+        self._kept_alive = self._heard = self._last_frame = time.monotonic()
 
     def _read_rate(self) -> None:
         body = self._ask(encode_message(Message.REQUEST, b"FrameRate\0"), Message.RESPONSE, 1)
@@ -175,16 +178,21 @@ class NatNetSource:
             with contextlib.suppress(OSError):
                 self._command.send(encode_message(Message.KEEP_ALIVE))
                 self._command.send(encode_message(Message.ECHO_REQUEST, bytes(8)))
+                # A server that was started anew answers echoes, but does not know this client.
+                if now - self._last_frame > _RESTART_SECONDS:
+                    self._command.send(encode_connect(VERSIONS[-1]))
 
     def _decoded(self, packet: bytes, arrived: float) -> SourceFrame | None:
         try:
             kind, body = decode_message(packet)
+            if kind == Message.SERVER_INFO:
+                self._version = min(decode_server_info(body).version, VERSIONS[-1])
             if kind != Message.FRAME:
                 return None
             frame = decode_frame(body, self._version)
+            self._last_frame = time.monotonic()
         except PacketError as error:
-            reason = str(error)
-            self.faults[reason] = self.faults.get(reason, 0) + 1
+            self._faults.undecoded(error)
             return None
         return SourceFrame(
             number=frame.number, time=frame.time, points=points_of(frame), received=arrived

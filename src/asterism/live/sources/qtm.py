@@ -10,10 +10,12 @@ import time
 import numpy as np
 
 from asterism.errors import SourceError, SourceLost
+from asterism.live.faults import Faults
 from asterism.live.frame import SourceFrame
 from asterism.live.protocols import qtm
 from asterism.live.protocols.packet_error import PacketError
-from asterism.live.protocols.qtm import Component, Packet
+from asterism.live.protocols.qtm import Packet
+from asterism.live.protocols.qtm_components import Component, decode_markers, decode_points
 from asterism.live.protocols.qtm_parameters import read_parameters
 
 __all__ = ["QtmSource"]
@@ -40,7 +42,8 @@ class QtmSource:
         self.name, self._address = name, (host, port)
         self.rate = 0.0
         self.waits = False
-        self.faults: dict[str, int] = {}
+        self._faults = Faults(name)
+        self.faults: dict[str, int] = self._faults.counts
         self._socket: socket.socket | None = None
         self._received = bytearray()
         self._arrived = 0.0
@@ -150,18 +153,17 @@ class QtmSource:
             try:
                 return self._frame(found[1])
             except PacketError as error:
-                reason = str(error)
-                self.faults[reason] = self.faults.get(reason, 0) + 1
+                self._faults.undecoded(error)
 
     def _frame(self, body: bytes) -> SourceFrame:
         data = qtm.decode_data(body)
         points: list[np.ndarray[tuple[int, int], np.dtype[np.float64]]] = []
         if Component.MARKERS in data.components:
-            markers = qtm.decode_markers(data.components[Component.MARKERS])
+            markers = decode_markers(data.components[Component.MARKERS])
             # All 32 bits set mark a marker that is not there.
             points.append(markers[~np.isnan(markers).all(axis=1)])
         if Component.POINTS in data.components:
-            points.append(qtm.decode_points(data.components[Component.POINTS])[0])
+            points.append(decode_points(data.components[Component.POINTS])[0])
         return SourceFrame(
             number=data.number,
             time=data.time,

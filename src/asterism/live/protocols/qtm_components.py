@@ -1,0 +1,226 @@
+"""Components of a data packet of the Qualisys real-time protocol: markers, points, image points.
+
+Positions are in millimetres. The layout here is the same in versions 1.12 to 1.28.
+"""
+
+from __future__ import annotations
+
+import struct
+from enum import IntEnum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.live.protocols.packet_error import PacketError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = [
+    "COMPONENTS",
+    "Component",
+    "decode_2d",
+    "decode_markers",
+    "decode_points",
+    "encode_markers",
+    "encode_nothing",
+    "encode_points",
+]
+
+_HEADER = 8
+_MM = 1000.0  # per metre
+
+
+class Component(IntEnum):
+    """Kinds of component of a data packet."""
+
+    MARKERS = 1
+    POINTS = 2
+    ANALOG = 3
+    FORCE = 4
+    BODIES = 5
+    BODIES_EULER = 6
+    IMAGE_POINTS = 7
+    IMAGE_POINTS_LINEAR = 8
+    MARKERS_RESIDUAL = 9
+    POINTS_RESIDUAL = 10
+    BODIES_RESIDUAL = 11
+    BODIES_EULER_RESIDUAL = 12
+    ANALOG_SINGLE = 13
+    IMAGE = 14
+    FORCE_SINGLE = 15
+    GAZE = 16
+    TIMECODE = 17
+    SKELETON = 18
+    EYE_TRACKER = 19
+
+
+COMPONENTS = {
+    "3d": Component.MARKERS,
+    "3dnolabels": Component.POINTS,
+    "analog": Component.ANALOG,
+    "force": Component.FORCE,
+    "6d": Component.BODIES,
+    "6deuler": Component.BODIES_EULER,
+    "2d": Component.IMAGE_POINTS,
+    "2dlin": Component.IMAGE_POINTS_LINEAR,
+    "3dres": Component.MARKERS_RESIDUAL,
+    "3dnolabelsres": Component.POINTS_RESIDUAL,
+    "6dres": Component.BODIES_RESIDUAL,
+    "6deulerres": Component.BODIES_EULER_RESIDUAL,
+    "analogsingle": Component.ANALOG_SINGLE,
+    "image": Component.IMAGE,
+    "forcesingle": Component.FORCE_SINGLE,
+    "gazevector": Component.GAZE,
+    "timecode": Component.TIMECODE,
+    "skeleton": Component.SKELETON,
+    "eyetracker": Component.EYE_TRACKER,
+}
+"""Component of each lower-case name that clients use in commands."""
+_WITH_RATES = {c for name, c in COMPONENTS.items() if name[0].isdigit()}  # 2D, 3D and 6D
+_ROWS = {
+    (order, kind): np.dtype([("place", f"{order}f4", 3), *more])
+    for order in "<>"
+    for kind, more in {
+        Component.MARKERS: (),
+        Component.MARKERS_RESIDUAL: (("residual", f"{order}f4"),),
+        Component.POINTS: (("id", f"{order}u4"),),
+        Component.POINTS_RESIDUAL: (("id", f"{order}u4"), ("residual", f"{order}f4")),
+    }.items()
+}
+_IMAGE_ROW = {
+    order: np.dtype([("x", f"{order}i4"), ("y", f"{order}i4"), ("size", f"{order}i2", 2)])
+    for order in "<>"
+}
+
+
+def encode_nothing(kind: Component, order: str = "<") -> bytes:
+    """Make a component that lists nothing."""
+    if kind in _WITH_RATES:
+        return struct.pack(f"{order}IIIHH", _HEADER + 8, kind, 0, 0, 0)
+    return struct.pack(f"{order}III", _HEADER + 4, kind, 0)
+
+
+def encode_markers(
+    markers: NDArray[np.float64], *, residuals: bool = False, order: str = "<"
+) -> bytes:
+    """Make the component of labelled markers.
+
+    Parameters
+    ----------
+    markers : ndarray of shape (K, 3)
+        Positions in the order of the labels, metres; NaN for a missing marker.
+    residuals : bool
+        Whether each marker has a residual, which is written as 0.
+    order : str
+        Byte order.
+    """
+    kind = Component.MARKERS_RESIDUAL if residuals else Component.MARKERS
+    rows = np.zeros(len(markers), _ROWS[order, kind])
+    rows["place"] = markers * _MM
+    missing = np.isnan(markers).any(axis=1)
+    if missing.any():
+        # Clients test a missing marker by all 32 bits, which is one of many patterns of NaN.
+        rows.view(f"{order}u4").reshape(len(rows), -1)[missing, :3] = 0xFFFFFFFF
+    return _component(kind, rows, order)
+
+
+def encode_points(
+    points: NDArray[np.float64],
+    ids: NDArray[np.int64],
+    *,
+    residuals: bool = False,
+    order: str = "<",
+) -> bytes:
+    """Make the component of unlabelled points.
+
+    Parameters
+    ----------
+    points : ndarray of shape (N, 3)
+        Positions, metres.
+    ids : ndarray of int, shape (N,)
+        Number of each point, of which the lowest 32 bits are sent.
+    residuals : bool
+        Whether each point has a residual, which is written as 0.
+    order : str
+        Byte order.
+    """
+    kind = Component.POINTS_RESIDUAL if residuals else Component.POINTS
+    rows = np.zeros(len(points), _ROWS[order, kind])
+    rows["place"] = points * _MM
+    rows["id"] = ids & 0xFFFFFFFF
+    return _component(kind, rows, order)
+
+
+def _component(kind: Component, rows: NDArray[np.void], order: str) -> bytes:
+    size = _HEADER + 8 + rows.nbytes
+    return struct.pack(f"{order}IIIHH", size, kind, len(rows), 0, 0) + rows.tobytes()
+
+
+def decode_markers(
+    body: bytes | memoryview, *, residuals: bool = False, order: str = "<"
+) -> NDArray[np.float64]:
+    """Return the labelled markers of a component, shape (K, 3), metres; NaN if missing.
+
+    Raises
+    ------
+    PacketError
+        If the component is truncated.
+    """
+    kind = Component.MARKERS_RESIDUAL if residuals else Component.MARKERS
+    return _rows(body, kind, order)["place"].astype(np.float64) / _MM
+
+
+def decode_points(
+    body: bytes | memoryview, *, residuals: bool = False, order: str = "<"
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return the unlabelled points of a component, shape (N, 3), metres, and their ids, (N,).
+
+    Raises
+    ------
+    PacketError
+        If the component is truncated.
+    """
+    kind = Component.POINTS_RESIDUAL if residuals else Component.POINTS
+    rows = _rows(body, kind, order)
+    return rows["place"].astype(np.float64) / _MM, rows["id"].astype(np.int64)
+
+
+def _rows(body: bytes | memoryview, kind: Component, order: str) -> NDArray[np.void]:
+    if len(body) < 8:
+        raise PacketError("a component without a whole header")
+    (n,) = struct.unpack_from(f"{order}I", body)
+    dtype = _ROWS[order, kind]
+    if n * dtype.itemsize > len(body) - 8:
+        raise PacketError(f"a component of {n} markers in {len(body)} bytes")
+    return np.frombuffer(body, dtype, count=n, offset=8)
+
+
+def decode_2d(body: bytes | memoryview, order: str = "<") -> list[NDArray[np.float64]]:
+    """Return the image points of each camera of a component, in units of 1/64 pixel.
+
+    Returns
+    -------
+    list of ndarray, each of shape (n, 2)
+
+    Raises
+    ------
+    PacketError
+        If the component is truncated.
+    """
+    if len(body) < 8:
+        raise PacketError("a component without a whole header")
+    (n_cameras,) = struct.unpack_from(f"{order}I", body)
+    dtype, at = _IMAGE_ROW[order], 8
+    cameras: list[NDArray[np.float64]] = []
+    for _ in range(n_cameras):
+        if len(body) < at + 5:
+            raise PacketError("a component with fewer cameras than it states")
+        (n,) = struct.unpack_from(f"{order}I", body, at)
+        at += 5  # the count and the flags of the camera
+        if n * dtype.itemsize > len(body) - at:
+            raise PacketError(f"{n} image points in {len(body)} bytes")
+        rows = np.frombuffer(body, dtype, count=n, offset=at)
+        cameras.append(np.column_stack([rows["x"], rows["y"]]).astype(np.float64))
+        at += n * dtype.itemsize
+    return cameras
