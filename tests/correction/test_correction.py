@@ -214,3 +214,41 @@ def test_a_gap_is_filled_or_left_open_as_stated():
     reasons = {(g.track, g.first): g.reason for g in left.gaps}
     assert reasons[gap.track, gap.first] == "left open by an edit"
     assert reasons[other.track, other.first] == ""
+
+
+def test_one_statement_mends_every_exchange_of_the_same_two_tracks():
+    truth = am.simulate.person(activity="walk", frames=300, seed=3)
+    a, b = nearest_pair(truth, 100)
+    tracks = swapped(swapped(truth, a, b, 40, 90), a, b, 180, 260)
+    model = am.estimate_model(truth.detections).model
+    own = np.flatnonzero(truth.labels == a)
+    edit = Edit(kind="same", at=at(truth.detections, own[140], own[220]))
+    assert am.evaluate(tracks, truth).idf1 < 1
+    assert am.evaluate(am.tracking.correct(tracks, [edit], model), truth).idf1 == 1
+
+
+def in_turns(truth, k, frames):
+    """Return tracks in which a marker is on another track in every second stretch of frames."""
+    labels, frame = truth.labels.copy(), truth.detections.frame_of
+    labels[(labels == k) & (frame // frames % 2 == 1)] = truth.n_tracks
+    return am.Tracks(detections=truth.detections, labels=labels)
+
+
+def test_two_tracks_of_one_marker_are_joined_as_a_whole():
+    truth = am.simulate.person(activity="walk", frames=300, seed=3)
+    tracks, model = in_turns(truth, 4, 30), am.estimate_model(truth.detections).model
+    own = np.flatnonzero(truth.labels == 4)
+    edit = Edit(kind="same", at=at(truth.detections, own[15], own[45]))
+    assert (am.tracking.correct(tracks, [edit], model).labels == truth.labels).all()
+
+
+def test_tracks_that_an_edit_keeps_apart_are_not_joined_as_a_whole():
+    truth = am.simulate.person(activity="walk", frames=300, seed=3)
+    tracks, model = in_turns(truth, 4, 30), am.estimate_model(truth.detections).model
+    own, d = np.flatnonzero(truth.labels == 4), truth.detections
+    edits = [
+        Edit(kind="different", at=at(d, own[15], own[105])),
+        Edit(kind="same", at=at(d, own[15], own[45])),
+    ]
+    found = am.tracking.correct(tracks, edits, model)
+    assert all(holds(edit, found) for edit in edits)

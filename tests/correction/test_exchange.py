@@ -1,4 +1,4 @@
-"""The best exchange of two tracks in time against one that tries every pair of cuts."""
+"""The best exchange of two tracks in time against one that tries every choice of intervals."""
 
 from __future__ import annotations
 
@@ -7,9 +7,12 @@ import pytest
 
 import asterism as am
 from asterism.tracking.correction.exchange import Lane, Motion, best_exchange
-from tests.references.exchange_in_time import best_interval, gain_of
+from tests.references.exchange_in_time import best_intervals, cost, gain_of, respects
 from tests.references.exchanges import exchange_ratio
 from tests.scenes import sized
+
+STATED = (0.03, 0.96, 0.01)
+"""Shares of detections that must stay, that are free, and that must go."""
 
 
 def problem(seed):
@@ -28,13 +31,14 @@ def problem(seed):
     lanes = []
     for k in (0, 1):
         own = np.flatnonzero(labels == k)
-        starts = rng.random(len(own)) < 0.2
+        starts = np.zeros(len(own), dtype=bool)
+        starts[rng.integers(len(own), size=2)] = True
         starts[:1] = True
         lanes.append(
             Lane(
                 detections=own, frames=d.frame_of[own], gains=rng.normal(0, 1, len(own)),
                 starts=starts, before=rng.uniform(0.1, 1, len(own)),
-                pinned=rng.random(len(own)) < 0.05,
+                stated=rng.choice(np.array([-1, 0, 1], dtype=np.int8), len(own), p=STATED),
             )
         )  # fmt: skip
     return d, model, tuple(lanes), rng
@@ -44,7 +48,7 @@ def problem(seed):
 def test_the_exchange_is_the_best_of_all(seed):
     d, model, lanes, rng = problem(seed)
     motion = Motion(d, model)
-    frame = int(rng.choice(lanes[0].frames))
+    lanes[0].stated[rng.integers(len(lanes[0].stated))] = 1
 
     def is_short(head, tail):
         return bool(motion.is_short(np.array([head]), np.array([tail]))[0])
@@ -62,24 +66,35 @@ def test_the_exchange_is_the_best_of_all(seed):
         list(
             zip(
                 lane.detections.tolist(), lane.frames.tolist(), lane.gains.tolist(),
-                lane.starts.tolist(), lane.before.tolist(), lane.pinned.tolist(), strict=True,
+                lane.starts.tolist(), lane.before.tolist(), lane.stated.tolist(), strict=True,
             )
         )
         for lane in lanes
     ]  # fmt: skip
-    wanted = best_interval(plain, frame, is_short, log_likelihood, ratio_of)
-    found = best_exchange(lanes, frame, motion)
-    if wanted is None:
-        # Without a cut between parts, those inside parts are tried; pins may still be in the way.
-        pins = np.concatenate([lane.frames[lane.pinned] for lane in lanes])
-        if found is None:
-            assert frame in pins
-        else:
-            assert not ((pins >= found.first) & (pins < found.end)).any()
+    wanted = best_intervals(plain, is_short, log_likelihood, ratio_of)
+    found = best_exchange(lanes, motion)
+    if found is None:
+        stated = [{t: one[5] for one in lane if one[5] for t in [one[1]]} for lane in plain]
+        assert any(stated[1].get(t, way) != way for t, way in stated[0].items())
         return
-    assert found.gain == pytest.approx(wanted[2], abs=1e-9)
-    own = gain_of(plain, found.first, found.end, is_short, log_likelihood, ratio_of)
-    assert own == pytest.approx(wanted[2], abs=1e-9)  # the same interval, or an equal one
+    intervals = list(zip(found.firsts.tolist(), found.ends.tolist(), strict=True))
+    assert respects(plain, intervals)
+    own = gain_of(plain, intervals, lambda t: cost(plain, t, is_short, log_likelihood, ratio_of))
+    assert own == pytest.approx(found.gain, abs=1e-9)
+    if wanted is not None:  # without a cut between parts, those inside parts are tried
+        assert found.gain >= wanted - 1e-9
+    if wanted is not None and set(np.ravel(intervals)) <= cuts_of(plain):
+        assert found.gain == pytest.approx(wanted, abs=1e-9)
+
+
+def cuts_of(plain):
+    """Return the frames in which parts begin or have ended."""
+    begins = {t for lane in plain for (_, t, _, is_start, _, _) in lane if is_start}
+    ends = {
+        lane[i][1] + 1 for lane in plain for i in range(len(lane))
+        if i + 1 == len(lane) or lane[i + 1][3]
+    }  # fmt: skip
+    return begins | ends
 
 
 def test_a_straight_continuation_fits_better_than_a_bent_one():

@@ -7,8 +7,10 @@ import pytest
 
 import asterism as am
 from asterism.edit import Session
-from asterism.model import Edit
+from asterism.model import Alternative, Decision, Edit
 from asterism.simulate import Burst, Ghosts
+from asterism.tracking.correction.constraints import detections_of
+from asterism.tracking.pipeline import Uncorrected
 
 
 @pytest.fixture(scope="module")
@@ -149,3 +151,22 @@ def test_a_decision_about_other_tracks_is_refused(session):
     with pytest.raises(am.ParameterError, match="indices below"):
         session.edit("clutter", 10**9)
     assert Edit(kind="clutter", at=((0, 0),)).who == ""
+
+
+def test_an_answer_about_two_exchanged_tracks_states_what_is_true(tmp_path):
+    truth = am.simulate.person(activity="walk", frames=300, seed=3)
+    d, frame = truth.detections, truth.detections.frame_of
+    a, b = 4, 5
+    labels, inside = truth.labels.copy(), (frame >= 100) & (frame < 180)
+    labels[inside & (truth.labels == a)], labels[inside & (truth.labels == b)] = b, a
+    tracks = am.Tracks(detections=d, labels=labels)
+    model = am.estimate_model(d).model
+    begun = Uncorrected(tracks=tracks, model=model, stitching=None, naming=None)
+    session = Session(am.tracking.plan_tracking(d).recipe, begun, tmp_path / "e.toml")
+    decision = Decision(kind="identity", track=a, first=100, last=179, n_detections=80)
+    edit = session.choose(decision, Alternative(track=b, probability=0.5))
+    # The detection of track b that is nearest in time is of marker a, as both were exchanged.
+    own = detections_of(edit, d)
+    assert len({int(truth.labels[i]) for i in own}) == 1
+    session.apply(edit)
+    assert am.evaluate(session.tracks, truth).idf1 == 1

@@ -1,6 +1,8 @@
-"""Exchange of two tracks in an interval: every pair of cuts, each by plain loops."""
+"""Exchange of two tracks in intervals: every choice of intervals, each by plain loops."""
 
 from __future__ import annotations
+
+import itertools
 
 import numpy as np
 
@@ -8,10 +10,10 @@ BEGIN, FARTHEST, MIN_RATIO = -6.0, 12.0, -4.0
 EXCHANGE = (-1.24, 0.26, 0.67)
 
 
-def best_interval(lanes, frame, is_short, log_likelihood, ratio_of):
-    """Return (first, end, gain) of the best exchange that contains a frame, None without one.
+def best_intervals(lanes, is_short, log_likelihood, ratio_of):
+    """Return the gain of the best exchange that respects what is stated, None without one.
 
-    Each lane is a list of (detection, frame, gain, is_start, probability, is_pinned).
+    Each lane is a list of (detection, frame, gain, is_start, probability, stated).
     """
     cuts = set()
     for lane in lanes:
@@ -20,24 +22,34 @@ def best_interval(lanes, frame, is_short, log_likelihood, ratio_of):
                 cuts.add(t)
             if i + 1 == len(lane) or lane[i + 1][3]:
                 cuts.add(t + 1)
-    pins = [t for lane in lanes for (_, t, _, _, _, pinned) in lane if pinned]
+    cuts = sorted(cuts)
+    costs = {cut: cost(lanes, cut, is_short, log_likelihood, ratio_of) for cut in cuts}
     best = None
-    for first in sorted(cuts):
-        for end in sorted(cuts):
-            if not first <= frame < end or any(first <= t < end for t in pins):
-                continue
-            gain = gain_of(lanes, first, end, is_short, log_likelihood, ratio_of)
-            if best is None or gain > best[2] + 1e-12:
-                best = first, end, gain
+    for states in itertools.product((False, True), repeat=len(cuts) - 1):
+        intervals = [(s, e) for s, e, state in zip(cuts, cuts[1:], states, strict=False) if state]
+        if respects(lanes, intervals):
+            gain = gain_of(lanes, intervals, costs.__getitem__)
+            best = gain if best is None else max(best, gain)
     return best
 
 
-def gain_of(lanes, first, end, is_short, log_likelihood, ratio_of):
-    """Return the log odds that an exchange in an interval gains."""
-    gain = sum(g for lane in lanes for (_, t, g, _, _, _) in lane if first <= t < end)
-    for cut in (first, end):
-        gain -= cost(lanes, cut, is_short, log_likelihood, ratio_of)
-    return gain
+def respects(lanes, intervals):
+    """Return whether all that must go is in an interval, and nothing that must stay."""
+    return all(
+        any(s <= t < e for s, e in intervals) == (stated > 0)
+        for lane in lanes
+        for (_, t, _, _, _, stated) in lane
+        if stated
+    )
+
+
+def gain_of(lanes, intervals, cost_of):
+    """Return the log odds that an exchange in intervals gains."""
+    gain = sum(
+        g for lane in lanes for (_, t, g, _, _, _) in lane if any(s <= t < e for s, e in intervals)
+    )
+    edges = [edge for interval in intervals for edge in interval]
+    return gain - sum(cost_of(edge) for edge in edges if edges.count(edge) == 1)
 
 
 def cost(lanes, cut, is_short, log_likelihood, ratio_of):

@@ -369,16 +369,15 @@ class Session:
     def _anchor(
         self, track: int, detection: int, without: NDArray[np.int64] | None = None
     ) -> int | None:
-        """Return the detection of a track that is nearest in time to another; pinned ones first."""
+        """Return the detection that stands for the marker of a track; stated ones first."""
         frame = self.tracks.detections.frame_of
         own = np.flatnonzero(self.tracks.labels == track)
         own = own[frame[own] != frame[detection]]
         own = own if without is None else np.setdiff1d(own, without)
         if not len(own):
             return None
-        stated = np.intersect1d(own, list(self._correction.constraints.pinned))
-        own = stated.astype(np.int64) if len(stated) else own
-        return int(own[np.abs(frame[own] - frame[detection]).argmin()])
+        stated = np.intersect1d(own, list(self._correction.constraints.pinned)).astype(np.int64)
+        return self._correction.anchor(stated if len(stated) else own)
 
     def _other(self, track: int, without: NDArray[np.int64]) -> int:
         own = np.setdiff1d(np.flatnonzero(self.tracks.labels == track), without)

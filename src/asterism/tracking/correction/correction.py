@@ -29,17 +29,21 @@ CLUTTER = -2
 """Label, while an edit is solved, of the detections without a track that one of them begins."""
 TRACKED = 3.0
 """Log odds of a detection that continues a track being of its marker instead of clutter."""
+MAX_SHARED = 0.02
+"""Largest share of the frames of a track that a track of the same marker may have too."""
 IDLE = 50
 """Frames along a track after which no more detections without a track are looked for."""
-MIN_FIT = -12.0
-"""Smallest log likelihood, relative to straight motion, of a detection that continues another."""
+MIN_FIT = -40.0
+"""Smallest log likelihood, relative to straight motion, of a detection that continues another. It
+is far below that of a link of the tracker, which misses markers that accelerate."""
 
 
 class Correction:
     """Tracks under correction; each edit changes only what depends on it.
 
     An edit states that a part of a track is of the marker of another track, or is not of its own.
-    Both tracks are exchanged in an interval around the part. Its ends are chosen so that the log
+    Tracks of one marker that share hardly a frame are joined as a whole. Two other tracks are
+    exchanged in intervals of time, of which one holds the part. They are chosen so that the log
     posterior is largest: the distances to other markers of what is exchanged, and the links that
     are cut, as in the identity confidence (`assess`). Detections of earlier edits stay.
 
@@ -151,6 +155,21 @@ class Correction:
         self._constraints = constraints
         return change
 
+    def anchor(self, candidates: NDArray[np.int64]) -> int:
+        """Return the detection that stands best for the marker of a track.
+
+        It is the middle of the longest part without an uncertain link. A detection that is merely
+        near in time may be in a part that is on a wrong track too.
+
+        Parameters
+        ----------
+        candidates : ndarray of int
+            Detections of one track to select from, rising; at least one.
+        """
+        parts = self._evidence.part_of[candidates]
+        own = candidates[parts == np.bincount(parts + 1).argmax() - 1]
+        return int(own[len(own) // 2])
+
     def undo(self) -> Change | None:
         """Take back the last edit, and return what it had changed; None without one."""
         if not self._done:
@@ -176,8 +195,32 @@ class Correction:
             (one, other), track = (own, b) if a < 0 else ((own[1], own[0]), a)
             self._take(one, track, beside=other)
             return
+        if self._may_be_one(*own):
+            frame = self._d.frame_of
+            is_shared = np.isin(frame, frame[self._labels == a])
+            self._labels[(self._labels == b) & ~is_shared] = a
+            if self._names[b] is not None:
+                self._names[a], self._names[b] = self._names[b], None
+            return
         self._carry_out(
             self._solve(own[1], b, a, beside=own[0]), self._solve(own[0], a, b, beside=own[1])
+        )
+
+    def _may_be_one(self, one: int, other: int) -> bool:
+        """Return whether the tracks of two detections may be of one marker as a whole.
+
+        They share hardly a frame, no stated detection is in one of these, and neither an edit nor
+        their names keep them apart.
+        """
+        a, b = int(self._labels[one]), int(self._labels[other])
+        first, second = (self._d.frame_of[self._labels == k] for k in (a, b))
+        shared = np.intersect1d(first, second)
+        stated = [i for i in (*self._constraints.pinned, one, other) if self._labels[i] in (a, b)]
+        return (
+            len(shared) <= MAX_SHARED * min(len(first), len(second))
+            and None in (self._names[a], self._names[b])
+            and not np.isin(self._d.frame_of[stated], shared).any()
+            and all(self._may_be(i, a) for i in stated if self._labels[i] == b)
         )
 
     def _part(self, own: Sequence[int], is_here: bool) -> None:
@@ -193,7 +236,6 @@ class Correction:
             found += [
                 self._solve(detection, a, other, cut, beside=beside)
                 for other in (*others, len(self._names))
-                if self._may_be(detection, other)
             ]
         self._carry_out(*found)
         if (self._labels == len(self._names)).any():
@@ -256,32 +298,31 @@ class Correction:
     ) -> _Solution | None:
         """Return the gain and the labels with a detection and its group on another track.
 
-        The detection `beside` of the same edit stays where it is.
+        Detections of other groups stay. The detection `beside` of the same edit stays where it is.
         """
-        group = self._constraints.group(detection)
-        fixed = (self._constraints.pinned - group) | self._constraints.clutter
-        fixed = np.array(sorted(fixed | ({beside} if beside is not None else set())))
+        if not self._may_be(detection, target):
+            return None
         labels = self._labels.copy() if labels is None else labels
-        frame, gain = self._d.frame_of, 0.0
-        for each in sorted(group, key=lambda i: (i != detection, i)):
-            if labels[each] != source:
-                continue
-            lanes = (
-                self._lane(source, target, labels, fixed),
-                self._lane(target, source, labels, fixed),
-            )
-            found = best_exchange(lanes, int(frame[each]), self._motion, cut)
-            if found is None:
-                return None
-            gain += found.gain
-            for lane, then in zip(lanes, (target, source), strict=True):
-                inside = (lane.frames >= found.first) & (lane.frames < found.end)
-                labels[lane.detections[inside]] = then
-            cut = None
-        return gain, labels
+        group = self._constraints.group(detection)
+        own = np.array(sorted(self._constraints.pinned | group))
+        is_group = np.isin(own, list(group))
+        stated = np.zeros(len(labels), dtype=np.int8)
+        stated[own] = np.where(is_group & (labels[own] == source), 1, -1)
+        if beside is not None:
+            stated[beside] = -1
+        lanes = (
+            self._lane(source, target, labels, stated),
+            self._lane(target, source, labels, stated),
+        )
+        found = best_exchange(lanes, self._motion, cut)
+        if found is None:
+            return None
+        for lane, then in zip(lanes, (target, source), strict=True):
+            labels[lane.detections[found.inside(lane.frames)]] = then
+        return found.gain, labels
 
     def _lane(
-        self, track: int, other: int, labels: NDArray[np.int64], fixed: NDArray[np.int64]
+        self, track: int, other: int, labels: NDArray[np.int64], stated: NDArray[np.int8]
     ) -> Lane:
         evidence, own = self._evidence, np.flatnonzero(labels == track)
         parts = evidence.part_of[own]
@@ -300,7 +341,7 @@ class Correction:
             ),
             starts=starts,
             before=before,
-            pinned=np.isin(own, fixed),
+            stated=stated[own],
         )
 
     def _carry_out(self, *solutions: _Solution | None) -> None:

@@ -1,4 +1,4 @@
-"""Exchange of two tracks in an interval of time: the most probable one around a detection.
+"""Exchange of two tracks in intervals of time: the most probable one that moves a detection.
 
 Legend: lane 0 and 1 are the two tracks, with detections in time order. A cut at frame t parts each
 lane into a head, before t, and a tail, from t on. An exchange from s to e cuts at s and at e.
@@ -24,8 +24,6 @@ __all__ = ["Exchange", "Lane", "Motion", "best_exchange"]
 
 FARTHEST = 12.0
 """Largest deviation of a link from straight motion that is counted, in log-likelihood units."""
-NEVER = np.iinfo(np.int64).max
-"""Frame after all others."""
 WINDOW = 64
 """Number of frames around a cut in which the filter looks for detections."""
 BEGIN = -6.0
@@ -51,8 +49,8 @@ class Lane:
         Whether a part of the track begins with each; within a part no link is uncertain.
     before : ndarray of shape (n,)
         Probability of the link that leads to each.
-    pinned : ndarray of bool, shape (n,)
-        Whether each must stay.
+    stated : ndarray of int, shape (n,)
+        1 for each that must go to the other lane, -1 for each that must stay, 0 for the others.
     """
 
     detections: NDArray[np.int64]
@@ -60,24 +58,30 @@ class Lane:
     gains: NDArray[np.float64]
     starts: NDArray[np.bool_]
     before: NDArray[np.float64]
-    pinned: NDArray[np.bool_]
+    stated: NDArray[np.int8]
 
 
-@record
+@record(eq=False)
 class Exchange:
-    """Exchange of two lanes in the frames from `first` up to but without `end`.
+    """Exchange of two lanes in intervals of time.
 
     Parameters
     ----------
-    first, end : int
-        First frame, and the frame after the last.
+    firsts, ends : ndarray of int, shape (n,)
+        First frame of each interval, and the frame after its last, rising.
     gain : float
         Change of the log posterior.
     """
 
-    first: int
-    end: int
+    firsts: NDArray[np.int64]
+    ends: NDArray[np.int64]
     gain: float
+
+    def inside(self, frames: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return whether frames are in one of the intervals."""
+        return np.searchsorted(self.firsts, frames, "right") > np.searchsorted(
+            self.ends, frames, "right"
+        )
 
 
 class Motion:
@@ -180,68 +184,91 @@ class Motion:
 
 
 def best_exchange(
-    lanes: tuple[Lane, Lane], frame: int, motion: Motion, cut: int | None = None
+    lanes: tuple[Lane, Lane], motion: Motion, cut: int | None = None
 ) -> Exchange | None:
-    """Return the most probable exchange of two tracks that contains a frame.
+    """Return the most probable exchange of two tracks that moves what must go.
+
+    It is a set of intervals. Every stated detection is respected, and all other places where both
+    tracks may have exchanged their later parts are decided with them.
 
     The score of an exchange is what its detections gain by their distances to other tracks, less
-    the log odds of the links that are cut at both ends.
+    the log odds of the links that are cut where an interval begins or ends.
 
     Parameters
     ----------
     lanes : tuple of two Lane
         The tracks.
-    frame : int
-        Frame that the exchange contains. No pinned detection is exchanged.
     motion : Motion
         Log likelihoods of links.
     cut : int, optional
-        Frame at which the exchange begins or before which it ends.
+        Frame at which an interval begins or before which it ends; the only one between the
+        stated detections on both sides.
 
     Returns
     -------
     Exchange or None
-        None if a pinned detection is in the way.
+        None if detections of one frame would have to stay and to go.
     """
-    pins = np.concatenate([lane.frames[lane.pinned] for lane in lanes])
-    if (pins == frame).any():
+    has = [lane.stated != 0 for lane in lanes]
+    frames = np.concatenate([lane.frames[own] for lane, own in zip(lanes, has, strict=True)])
+    goes = np.concatenate([lane.stated[own] > 0 for lane, own in zip(lanes, has, strict=True)])
+    order = np.argsort(frames, kind="stable")
+    frames, goes = frames[order], goes[order]
+    turns = np.flatnonzero(goes[1:] != goes[:-1])
+    if (frames[turns] == frames[turns + 1]).any():
         return None
-    lowest = int(pins[pins < frame].max(initial=-1)) + 1
-    highest = int(pins[pins > frame].min(initial=NEVER))
-    all_cuts = _cuts(lanes, (lowest, frame), (frame + 1, highest))
-    costs = _costs(lanes, all_cuts, motion)
-    total = np.zeros(len(all_cuts))
+    cuts = _cuts(lanes, list(zip(frames[turns], frames[turns + 1], strict=True)), cut)
+    costs = _costs(lanes, cuts, motion)
+    total = np.zeros(len(cuts))
     for lane in lanes:
-        total += np.concatenate([[0], np.cumsum(lane.gains)])[
-            np.searchsorted(lane.frames, all_cuts)
-        ]
-    begins = (all_cuts >= lowest) & (all_cuts <= frame)
-    ends = (all_cuts > frame) & (all_cuts <= highest)
-    if cut is not None and cut <= frame:
-        begins &= all_cuts == cut
-    elif cut is not None:
-        ends &= all_cuts == cut
-    if not begins.any() or not ends.any():
-        return None
-    from_begin = np.where(begins, -costs - total, -np.inf)
-    from_end = np.where(ends, total - costs, -np.inf)
-    # The latest begin and the earliest end of equal ones: as little as possible changes.
-    i = len(all_cuts) - 1 - int(np.argmax(from_begin[::-1]))
-    j = int(np.argmax(from_end))
-    return Exchange(
-        first=int(all_cuts[i]), end=int(all_cuts[j]), gain=float(from_begin[i] + from_end[j])
-    )
+        total += np.concatenate([[0], np.cumsum(lane.gains)])[np.searchsorted(lane.frames, cuts)]
+    odds = np.stack([np.zeros(len(cuts) - 1), np.diff(total)])
+    at = np.searchsorted(cuts, frames, side="right") - 1
+    odds[1 - goes.astype(np.int64), at] = -np.inf
+    is_exchanged, gain = _best_states(odds, costs)
+    edges = np.diff(np.concatenate([[0], is_exchanged, [0]]))
+    return Exchange(firsts=cuts[edges > 0], ends=cuts[edges < 0], gain=gain)
 
 
-def _cuts(lanes: tuple[Lane, Lane], *ranges: tuple[int, int]) -> NDArray[np.int64]:
-    """Return the frames in which parts begin or have ended, and all frames of a range without."""
+def _best_states(odds: NDArray[np.float64], costs: NDArray[np.float64]) -> tuple[list[int], float]:
+    """Return whether each interval between cuts is exchanged (Viterbi's algorithm), and the gain.
+
+    Of equal solutions that with the latest begins and the earliest ends is taken.
+
+    Parameters
+    ----------
+    odds : ndarray of shape (2, n)
+        Log odds of each interval as it is, and exchanged.
+    costs : ndarray of shape (n + 1,)
+        Log odds that are lost where an exchange begins or ends.
+    """
+    keep, swap = 0.0, float("-inf")
+    came_from: list[tuple[bool, bool]] = []
+    for as_it_is, exchanged, cost in zip(*odds.tolist(), costs[:-1].tolist(), strict=True):
+        came_from.append((swap - cost > keep, keep - cost < swap))
+        keep, swap = max(keep, swap - cost) + as_it_is, max(swap, keep - cost) + exchanged
+    swap -= float(costs[-1])
+    state = swap > keep
+    states: list[int] = []
+    for sources in reversed(came_from):
+        states.append(int(state))
+        state = sources[state]
+    return states[::-1], max(keep, swap)
+
+
+def _cuts(
+    lanes: tuple[Lane, Lane], turns: list[tuple[int, int]], cut: int | None
+) -> NDArray[np.int64]:
+    """Return the frames in which parts begin or have ended, at least one at each turn."""
     frames = np.concatenate([lane.frames for lane in lanes])
     begins = [lane.frames[lane.starts] for lane in lanes]
     ends = [lane.frames[np.append(lane.starts[1:], True)[: len(lane.frames)]] + 1 for lane in lanes]
-    cuts = np.concatenate([*begins, *ends])
-    for low, high in ranges:
-        if not ((cuts >= low) & (cuts <= high)).any():
-            cuts = np.concatenate([cuts, frames[(frames >= low) & (frames <= high)], [high]])
+    cuts = np.unique(np.concatenate([*begins, *ends]))
+    for low, high in turns:
+        if cut is not None and low < cut <= high:
+            cuts = np.append(cuts[(cuts <= low) | (cuts > high)], cut)
+        elif not ((cuts > low) & (cuts <= high)).any():
+            cuts = np.concatenate([cuts, frames[(frames > low) & (frames <= high)], [high]])
     return np.unique(cuts)
 
 
