@@ -3,7 +3,7 @@
 //
 // Where two tracks are exchanged, their distances to a third marker are exchanged too. The
 // difference of both distances then changes its sign, so that the frames of a pair fall into two
-// groups even if nobody knows which group is right; the larger one counts as right. With the medians
+// groups whichever group is right; the larger one counts as right. With the medians
 // m of the distances d of both tracks, frame by frame,
 //
 //   e = w Σ_r [ t(d_ar; m_br) + t(d_br; m_ar) - t(d_ar; m_ar) - t(d_br; m_br) ]
