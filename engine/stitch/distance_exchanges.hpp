@@ -125,8 +125,11 @@ class DistanceExchanges {
     const auto K = static_cast<std::int32_t>(tracks_.size());
     usual_.assign(tracks_.size() * tracks_.size(), kInfinite);
     std::vector<double> values;
+    // Fragments are compared with nothing, however many there are.
+    const auto is_long = [&](std::int32_t k) { return tracks_[k].frames.size() >= kMinTogether; };
     for (std::int32_t a = 0; a < K; ++a)
-      for (std::int32_t b = a + 1; b < K; ++b) {
+      for (std::int32_t b = a + 1; b < K && is_long(a); ++b) {
+        if (!is_long(b)) continue;
         values.clear();
         for (std::int64_t s = 0; s < n; ++s) {
           const Point* one = tracks_[a].find(s * T / n);
