@@ -8,7 +8,9 @@ import pytest
 import asterism as am
 from asterism import _engine
 from asterism.model.compiled import motion_model, steps_of
-from asterism.tracking.stitching.exchanged import exchanged_back
+from asterism.tracking.stitching import exchanged as module
+from asterism.tracking.stitching.exchanged import exchanged_back, exchanged_by_distances
+from asterism.tracking.stitching.passes import Pass
 from tests.references.distance_exchanges import stretches
 from tests.scenes import sized
 
@@ -167,6 +169,25 @@ def test_a_stitching_with_exchanges_is_whole():
         assert (n > 0).all()
         assert ((stitching.probabilities > 0) & (stitching.probabilities <= 1)).all()
     assert found is not None
+
+
+def test_a_join_over_a_part_that_left_is_as_probable_as_the_exchange(monkeypatch):
+    """The middle one of three tracklets of a marker moves to another marker."""
+    points = [np.zeros((n, 3)) + np.arange(n)[:, None] for n in (2, 1, 2)]
+    d = am.Detections.from_frames(np.arange(3) * 0.01, points)
+    found = Pass(
+        tracklets=np.array([0, 1, 2, 3, 4], dtype=np.int32),
+        markers=np.array([0, 1, 0, 0, 1], dtype=np.int32),
+        after=np.array([-1, -1, 0, 2, 1], dtype=np.int32),
+        probabilities=np.full(5, 0.9),
+    )
+    log_odds = np.array([np.inf, np.inf, 8.0, np.inf, np.inf])
+    monkeypatch.setattr(module, "exchanged_back", lambda *_: (np.array([0, 1, 1, 0, 1]), log_odds))
+    after = exchanged_by_distances(d, found, model_of(am.simulate.cube(frames=20).detections))
+    assert after.markers.tolist() == [0, 1, 1, 0, 1]
+    assert after.after.tolist() == [-1, -1, 1, 0, 2]
+    p = 1 / (1 + np.exp(-_engine.Stitcher.ODDS_FACTOR * 8))
+    assert after.probabilities.tolist() == pytest.approx([0.9, 0.9, p, p, p])
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from asterism.model import TrackingModel, Tracks
 from asterism.records import record
 from asterism.tracking.rigidity.bonds import Bonds, learn_bonds
 from asterism.tracking.stitching.agreement import agreeing
-from asterism.tracking.stitching.exchanged import exchanged_back
+from asterism.tracking.stitching.exchanged import exchanged_by_distances
 from asterism.tracking.stitching.passes import Pass, go_through
 
 if TYPE_CHECKING:
@@ -239,7 +239,7 @@ def stitch(
     options = stitch_options(*limits, may_cut=False)
     found = go_through(d, found.tracklets, model, options, before=found)
     found = _joined_by_distances(d, found, model.sensor.noise_sigma, max_occlusion)
-    found = _exchanged_by_distances(d, found, model)
+    found = exchanged_by_distances(d, found, model)
     tracklets, markers, after = found.tracklets, found.markers, found.after
     # The last element is the label of clutter.
     labels = np.append(np.maximum(markers, -1), -1).astype(np.int64)[tracklets]
@@ -286,56 +286,6 @@ def _joined_by_distances(
     if len(used) <= markers.max(initial=-1):
         markers[markers >= 0] = numbers
     return replace(found, markers=markers, after=after, probabilities=probabilities)
-
-
-def _exchanged_by_distances(d: Detections, found: Pass, model: TrackingModel) -> Pass:
-    """Exchange the markers of tracklets, or of parts of them, that have each other's marker."""
-    before = np.append(np.maximum(found.markers, -1), -1).astype(np.int64)[found.tracklets]
-    labels, log_odds = exchanged_back(d, before, model)
-    if np.array_equal(labels, before):
-        return found
-    # Each part of a tracklet with a marker of its own is a tracklet; they are numbered by their
-    # start, as before.
-    inside = np.flatnonzero(found.tracklets >= 0)
-    order = inside[np.argsort(found.tracklets[inside], kind="stable")]
-    begins = np.ones(len(order), dtype=bool)
-    begins[1:] = np.diff(found.tracklets[order]) != 0
-    is_edge = np.zeros(len(order), dtype=bool)
-    is_edge[1:] = ~begins[1:] & (np.diff(labels[order]) != 0)
-    part = np.cumsum(begins | is_edge) - 1
-    first = order[begins | is_edge]
-    number = np.argsort(np.argsort(first, kind="stable"), kind="stable")
-    tracklets = np.full(len(found.tracklets), -1, dtype=np.int32)
-    tracklets[order] = number[part]
-    starts = np.sort(first)
-    old = found.tracklets[starts]
-    markers = np.where(found.markers[old] < 0, found.markers[old], labels[starts]).astype(np.int32)
-    after = np.full(len(starts), -1, dtype=np.int32)
-    chain = np.lexsort((np.arange(len(starts)), markers))
-    follows = (np.diff(markers[chain]) == 0) & (markers[chain[1:]] >= 0)
-    after[chain[1:][follows]] = chain[:-1][follows]
-    # A join that was there before keeps its probability; the others have that of the exchange.
-    probabilities = found.probabilities[old].copy()
-    last = np.full(len(starts), -1)
-    last[tracklets[order]] = order
-    joined = np.flatnonzero(after >= 0)
-    same = (found.after[old[joined]] == found.tracklets[last[after[joined]]]) & (
-        starts[joined] == _first_of(found.tracklets)[old[joined]]
-    )
-    new = joined[~same]
-    odds = np.minimum(log_odds[starts[new]], log_odds[last[after[new]]])
-    probabilities[new] = 1 / (1 + np.exp(-_engine.Stitcher.ODDS_FACTOR * odds))
-    return replace(
-        found, tracklets=tracklets, markers=markers, after=after, probabilities=probabilities
-    )
-
-
-def _first_of(tracklets: NDArray[np.int32]) -> NDArray[np.int64]:
-    """Return the first detection of each tracklet."""
-    inside = np.flatnonzero(tracklets >= 0)[::-1]
-    first = np.full(int(tracklets.max(initial=-1)) + 1, -1)
-    first[tracklets[inside]] = inside
-    return first
 
 
 def check_options(confirm: int, ghost_radius: float, max_occlusion: int | None) -> None:
