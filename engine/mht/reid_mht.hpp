@@ -38,6 +38,7 @@ class HypothesisMatrix {
   template <typename Label>
   void add(std::shared_ptr<WindowFrame> frame, TreeStats& stats, Label&& label) {
     open_.advise(*frame, stats);
+    open_.advance(frame->step);
     open_.claim(*frame);
     open_.frames.push_back(frame);
     s_.ways.grow(open_, stats);
@@ -119,16 +120,17 @@ class HypothesisMatrix {
       };
       const Branch *one = branch_of(a), *other = branch_of(b);
       if (!one && !other) continue;
-      if (!one || !other || one->gap != other->gap || !is_near(*one, *other)) return false;
+      if (!one || !other || one->gap != other->gap || !is_near(open_.tree(i).more, *one, *other)) return false;
     }
     return true;
   }
 
   // Whether means and standard deviations differ by at most `merged_within` standard deviations of
   // the first.
-  bool is_near(const Branch& a, const Branch& b) const {
+  bool is_near(const Tree& tree, const Branch& a, const Branch& b) const {
     const MotionModel& m = open_.live.m;
-    const AxisState one = collapse(m, a.state.updated(m)), other = collapse(m, b.state.updated(m));
+    const AxisState one = collapse(m, tree.state_of(m, a)),
+                    other = collapse(m, tree.state_of(m, b));
     const int n = m.axis.n;
     for (int s = 0; s < n; ++s) {
       const double sigma = std::sqrt(one.P[s * n + s]);

@@ -84,52 +84,14 @@ struct WindowFrame {
   }
 };
 
-// The state of a branch after its last frame. Most branches are pruned before the next frame, so the
-// update with the detection is computed on demand. The predicted state is shared by the branches of
-// one parent.
-class BranchState {
- public:
-  BranchState() = default;
-  explicit BranchState(MotionState state)
-      : predicted_(std::make_shared<const MotionState>(std::move(state))) {}
-
-  MotionState updated(const MotionModel& m) const {
-    MotionState state = *predicted_;
-    update_if_detected(m, state);
-    return state;
-  }
-  // The prediction from the updated state. It is made in place, because states are large.
-  BranchState next(const MotionModel& m, const MotionStep& step) const {
-    const auto state = std::make_shared<MotionState>(*predicted_);
-    update_if_detected(m, *state);
-    predict(m, step, *state);
-    BranchState out;
-    out.predicted_ = state;
-    return out;
-  }
-  const MotionState& predicted() const { return *predicted_; }
-  // Updates the predicted state with a detection. `each` and its likelihood are from the prediction.
-  void detect(const Point& y, const std::array<double, kMaxModes>& each, double log_likelihood) {
-    y_ = y;
-    each_ = each;
-    log_likelihood_ = log_likelihood;
-    is_detected_ = true;
-  }
-
- private:
-  void update_if_detected(const MotionModel& m, MotionState& state) const {
-    if (is_detected_) update(m, each_, log_likelihood_, y_, state);
-  }
-
-  std::shared_ptr<const MotionState> predicted_;
-  Point y_{};
-  std::array<double, kMaxModes> each_{};
-  double log_likelihood_ = 0;
-  bool is_detected_ = false;
-};
-
 struct Branch {
-  BranchState state;
+  // The last frame: the prediction for it, by its number in the tree, and the detection taken, which
+  // is `last`, with the likelihoods from that prediction. Most branches are pruned before the next
+  // frame, so the update with the detection is computed on demand.
+  std::int32_t prediction = 0;
+  bool is_detected = false;
+  std::array<double, kMaxModes> each{};
+  double log_likelihood = 0;
   double score = 0;  // as in LiveTrack
   double lambda = 0;
   std::int64_t n_updates = 0;
@@ -157,6 +119,36 @@ struct Tree {
   double lambda = 0;
   std::int64_t n_updates = 0;
   std::vector<Branch> branches;
+  // States predicted for the newest frame, one for each branch that it had before. They change in
+  // that frame only, so that copies of the tree share them afterwards.
+  std::shared_ptr<std::vector<MotionState>> predicted;
+
+  // Begins with one branch in a given state.
+  void plant(const MotionState& state, Branch branch) {
+    predicted = std::make_shared<std::vector<MotionState>>(1, state);
+    branches.assign(1, std::move(branch));
+  }
+  const MotionState& predicted_of(const Branch& b) const { return (*predicted)[b.prediction]; }
+  // The state of a branch after its last frame.
+  MotionState state_of(const MotionModel& m, const Branch& b) const {
+    MotionState state = predicted_of(b);
+    if (b.is_detected) update(m, b.each, b.log_likelihood, b.last, state);
+    return state;
+  }
+  // Predicts all branches for the next frame.
+  void advance(const MotionModel& m, const MotionStep& step) {
+    auto next = std::make_shared<std::vector<MotionState>>();
+    next->reserve(branches.size());
+    for (Branch& b : branches) {
+      if (b.has_ended) continue;
+      MotionState& state = next->emplace_back(predicted_of(b));
+      if (b.is_detected) update(m, b.each, b.log_likelihood, b.last, state);
+      predict(m, step, state);
+      b.prediction = static_cast<std::int32_t>(next->size()) - 1;
+      b.is_detected = false;
+    }
+    predicted = std::move(next);
+  }
 
   // The branch of the last joint choice if there is one, else the most likely branch.
   const Branch& best() const {
@@ -181,10 +173,9 @@ class BranchGrower {
     return b.score - live_.misses_gain(0, b.unpredicted()) + opt_.log_end[b.unpredicted()];
   }
 
-  // A branch for the decided part of a track.
-  Branch root(const LiveTrack<Tree>& track) const {
+  // Begins the tree of a track with one branch, for its decided part.
+  void plant(LiveTrack<Tree>& track) const {
     Branch b;
-    b.state = BranchState(track.state);
     b.score = track.score;
     b.lambda = track.more.lambda;
     b.n_updates = track.more.n_updates;
@@ -193,10 +184,11 @@ class BranchGrower {
     b.gap = track.gap;
     b.carried = track.carried;
     if (!opt_.is_joint) b.distance2.assign(kMaxWindow, 0);
-    return b;
+    track.more.plant(track.state, std::move(b));
   }
 
-  // Splits every branch over a further frame, the n_open-th undecided one. Then prunes to at most
+  // Splits every branch over a further frame, the n_open-th undecided one, for which the tree has
+  // been advanced. Then prunes to at most
   // `max_branches`; kAll keeps all.
   static constexpr std::int32_t kAll = std::numeric_limits<std::int32_t>::max();
   void grow(const WindowFrame& frame, LiveTrack<Tree>& track, std::int32_t n_open,
@@ -224,7 +216,7 @@ class BranchGrower {
 
   // Adds the continuations of a branch in a further frame: one for each detection in its gate, then
   // the missed detection, into which the branch itself turns. The branch is moved from.
-  void split(const WindowFrame& frame, const LiveTrack<Tree>& track, Branch& parent,
+  void split(const WindowFrame& frame, LiveTrack<Tree>& track, Branch& parent,
              std::vector<Branch>& out, TreeStats& stats) const {
     const std::int64_t slot = frame.number % kMaxWindow;
     parent.path[slot] = -1;
@@ -237,10 +229,8 @@ class BranchGrower {
       out.push_back(std::move(parent));
       return;
     }
-    parent.state = parent.state.next(live_.m, frame.step);
-    const MotionState& predicted = parent.state.predicted();
     const NeighbourAdvice* advice = frame.advice_to(track.more.key);
-    const Expected all = expected(predicted, parent.gap, advice);
+    const Expected all = expected(track.more.predicted_of(parent), parent.gap, advice);
     const double hit = live_.hit_gain(parent.gap), miss = live_.miss_gain(parent.gap);
     const double min_log_likelihood =
         track.is_confirmed() ? miss + live_.leftover_gain() - hit - opt_.prune_drop
@@ -260,11 +250,15 @@ class BranchGrower {
       if (!std::isfinite(hit_gain)) return;
       Branch& child = out.emplace_back(parent);  // branches are large, so it is not copied again
       if (all.is_carried()) {
-        MotionState chosen = predicted;
+        std::vector<MotionState>& states = *track.more.predicted;
+        MotionState chosen = states[parent.prediction];
         all.choose(y, chosen);
-        child.state = BranchState(chosen);
+        child.prediction = static_cast<std::int32_t>(states.size());
+        states.push_back(chosen);
       }
-      child.state.detect(y, each, log_likelihood);
+      child.is_detected = true;
+      child.each = each;
+      child.log_likelihood = log_likelihood;
       child.score += opt_.is_joint ? hit_gain : hit_gain - frame.crowding(track.more.key, j);
       if (advice != nullptr) child.score += advice->of(j);
       child.lambda = lambda;
@@ -297,15 +291,14 @@ class BranchGrower {
     out.push_back(std::move(parent));
   }
 
-  // Adds the claims of a track's best branch on the detections of the next frame.
+  // Adds the claims of a track's best branch on the detections of the next frame, for which its tree
+  // has been advanced.
   void claim(const LiveTrack<Tree>& track, WindowFrame& frame) {
     const Branch& best = track.more.branches.front();
     if (best.has_ended) return;
     const NeighbourAdvice* advice = frame.advice_to(track.more.key);
     if (advice != nullptr && advice->is_reappearance) return;
-    MotionState state = best.state.updated(live_.m);
-    predict(live_.m, frame.step, state);
-    const Expected all = expected(state, best.gap, advice);
+    const Expected all = expected(track.more.predicted_of(best), best.gap, advice);
     const Prediction& prediction = all.prediction();
     const double log_hit = live_.sm.log_hit(best.gap) - live_.sm.log_clutter;
     // Smaller weights are negligible against clutter.

@@ -74,6 +74,11 @@ struct HypothesisWindow : OpenWindow {
       stats.peak_branches = std::max<std::int64_t>(stats.peak_branches, tree(i).more.branches.size());
   }
 
+  void advance(const MotionStep& step) {
+    OpenWindow::advance(step);
+    for (LiveTrack<Tree>& seed : seeds) seed.more.advance(live.m, step);
+  }
+
   // Initiates a tree at each detection of the newest frame.
   void begin_trees() {
     const WindowFrame& frame = *frames.back();
@@ -86,10 +91,10 @@ struct HypothesisWindow : OpenWindow {
       seed.state = begin_state(live.m, seed.last);
       seed.more.key = n_trees++;
       seed.more.first = frame.number;
-      Branch b = BranchGrower(live, branches).root(seed);
+      BranchGrower(live, branches).plant(seed);
+      Branch& b = seed.more.branches.front();
       b.path[frame.number % kMaxWindow] = static_cast<std::int32_t>(j);
       b.n_taken = 1;
-      seed.more.branches.push_back(std::move(b));
       seeds.push_back(std::move(seed));
     }
   }
@@ -134,6 +139,7 @@ struct HypothesisWindow : OpenWindow {
     track.pending.back().confidence = probability;
     track.more.key = seed.more.key;
     track.more.branches = std::move(seed.more.branches);
+    track.more.predicted = std::move(seed.more.predicted);
     if (n_open() == 0)
       regrow(track, stats);
     else

@@ -46,6 +46,10 @@ struct OpenWindow {
   void advise(WindowFrame& frame, TreeStats& stats) {
     if (carrier.is_on()) carrier.advise(live, n_open(), frame, stats);
   }
+  // Predicts all branches for an arriving frame.
+  void advance(const MotionStep& step) {
+    for (LiveTrack<Tree>& track : live.tracks) track.more.advance(live.m, step);
+  }
   // Collects the claims of the confirmed tracks on its detections.
   void claim(WindowFrame& frame) const {
     BranchGrower grower(live, branches);
@@ -133,9 +137,12 @@ struct OpenWindow {
 
   void regrow(LiveTrack<Tree>& track, TreeStats& stats) {
     BranchGrower grower(live, branches);
-    track.more.branches.assign(1, grower.root(track));
+    grower.plant(track);
     std::int32_t n = 0;
-    for (const auto& frame : frames) grower.grow(*frame, track, ++n, branches.max_branches, stats);
+    for (const auto& frame : frames) {
+      track.more.advance(live.m, frame->step);
+      grower.grow(*frame, track, ++n, branches.max_branches, stats);
+    }
   }
 };
 

@@ -47,6 +47,7 @@ class HypothesisForest {
   template <typename Label>
   void add(std::shared_ptr<WindowFrame> frame, TreeStats& stats, Label&& label) {
     open_.advise(*frame, stats);
+    open_.advance(frame->step);
     open_.claim(*frame);
     open_.push(frame, stats);
     BranchGrower grower(open_.live, open_.branches);

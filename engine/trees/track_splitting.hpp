@@ -34,6 +34,7 @@ class Forest {
   template <typename Label>
   void add(std::shared_ptr<WindowFrame> frame, TreeStats& stats, Label&& label) {
     open_.advise(*frame, stats);
+    open_.advance(frame->step);
     if (!opt_.is_independent) open_.claim(*frame);
     open_.push(std::move(frame), stats);
     if (!open_.is_full()) return;

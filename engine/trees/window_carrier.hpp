@@ -103,7 +103,7 @@ class WindowCarrier {
     row.first_time = track.first_time;
     row.last_time = b.last_time;
     row.last = b.last;
-    row.state = b.state.updated(rows.m);
+    row.state = track.more.state_of(rows.m, b);
     s_.place.push_back(s_.advice.size() - 1);
   }
   bool is_best(std::size_t row) const { return row == 0 || s_.place[row] != s_.place[row - 1]; }
