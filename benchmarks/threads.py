@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import asterism as am
+from asterism.tracking.methods.associate import associate
 from report import conditions, publish, table
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ def side_by_side(pool: Executor, task: Callable[..., bytes], items: list[object]
 
 def sampled(d: am.Detections, model: am.TrackingModel, threads: int, chains: int) -> list[bytes]:
     method = am.MCMCDA(threads=threads, chains=chains)
-    found = am.track(d, method, model=model, seed=1)
+    found = associate(method, d, model, seed=1)
     assert found.confidence is not None
     return [found.labels.tobytes(), found.confidence.tobytes()]
 
@@ -111,8 +112,8 @@ def main() -> None:
     parser.add_argument("--markdown", type=Path)
     options = parser.parse_args()
     captures = people()
-    scene = am.simulate.smooth(n_markers=1000, frames=40, seed=1)
-    dense = am.simulate.corrupt(scene, missing=0.1, clutter=0.1, noise=0.002, seed=1).detections
+    scene = am.simulate.dense(n_markers=1000, frames=40, seed=1)
+    dense = am.simulate.corrupt(scene, missing=0.1, clutter=0.1, noise=0.005, seed=2).detections
     model = am.estimate_model(dense).model
     with ThreadPoolExecutor(2) as threads, ProcessPoolExecutor(2) as processes:
         list(processes.map(track, captures[:2]))  # the processes have imported all by now
