@@ -155,12 +155,11 @@ def test_json_lines_to_a_file_and_over_udp(tmp_path):
     assert found == {
         "frame": 8, "time": 0.08, "points": frame.points.tolist(), "labels": [1, 7, -1, 0],
         "names": ["B", None, None, "A"],
-        "tracks": [
-            {"id": 1, "name": "B", "position": [0, 0, 0], "seen": True, "velocity": [0, 0, 0],
-             "existence": pytest.approx(0.9933, abs=1e-4)},
-            {"id": 7, "name": None, "position": None, "seen": False, "velocity": None,
-             "existence": None},
-        ],
+        "tracks": {
+            "id": [1, 7], "name": ["B", None], "position": [[0, 0, 0], None],
+            "seen": [True, False], "velocity": [[0, 0, 0], None],
+            "existence": [pytest.approx(0.9933, abs=1e-4), None],
+        },
     }  # fmt: skip
     with pytest.raises(SinkError, match="exists already"):
         JsonFileSink(path).open(HEADER)

@@ -149,7 +149,9 @@ class Intake:
         self._clock.add(frame.time, frame.received)
         self._last, self._time = frame, time
         self._back = []
-        return Accepted(replace(frame, time=time), max(n_missing, 0))
+        if time != frame.time:
+            frame = replace(frame, time=time)
+        return Accepted(frame, max(n_missing, 0))
 
     def _by_arrival(self, frame: SourceFrame, last: SourceFrame) -> float:
         """Return the time of the stream by the time since the last arrival."""

@@ -2,7 +2,7 @@
 
 A line that comes in has ``frame`` (whole number), ``time`` (seconds) and ``points`` (a list of
 three coordinates each, metres; null for a missing one). A line that goes out has ``labels``,
-``names`` and ``tracks`` as well.
+``names`` and ``tracks`` as well. ``tracks`` holds columns with one entry for each track.
 """
 
 from __future__ import annotations
@@ -71,15 +71,15 @@ def decode_line(line: bytes) -> tuple[int, float, NDArray[np.float64]]:
     if not isinstance(points, list):
         raise PacketError("points that are no list")
     rows = [row for row in cast("list[Any]", points) if row is not None]
-    for row in rows:
-        if not isinstance(row, list) or len(cast("list[Any]", row)) != 3:
-            raise PacketError("a point without three coordinates")
-        if not all(isinstance(x, (int, float)) for x in cast("list[Any]", row)):
-            raise PacketError("a coordinate that is no number")
     try:
-        places = np.array(rows, dtype=np.float64).reshape(-1, 3)
-    except OverflowError:
-        raise PacketError("a coordinate that is too large") from None
+        places = np.array(rows or np.zeros((0, 3)))
+    except ValueError:
+        raise PacketError("a point without three coordinates") from None
+    if places.ndim != 2 or places.shape[1] != 3:
+        raise PacketError("a point without three coordinates")
+    if places.dtype.kind not in "iuf":
+        raise PacketError("a coordinate that is no number")
+    places = places.astype(np.float64, copy=False)
     return int(number), float(time), places
 
 
@@ -111,32 +111,32 @@ def encode_line(frame: LiveFrame) -> bytes:
         "frame": int(frame.number),
         "time": float(frame.time),
         "points": _places(frame.points),
-        "labels": frame.labels.tolist(),
+        "labels": np.ascontiguousarray(frame.labels),
     }
     if frame.names is not None:
-        record["names"] = list(frame.names)
+        record["names"] = frame.names
     if frame.tracks is not None:
         record["tracks"] = _tracks(frame.tracks)
-    return orjson.dumps(record, option=orjson.OPT_APPEND_NEWLINE)
+    return orjson.dumps(record, option=orjson.OPT_APPEND_NEWLINE | orjson.OPT_SERIALIZE_NUMPY)
 
 
-def _tracks(states: TrackStates) -> list[dict[str, Any]]:
-    columns: dict[str, list[Any]] = {
-        "id": states.ids.tolist(),
-        "name": list(states.names),
+def _tracks(states: TrackStates) -> dict[str, Any]:
+    """Return the states as columns, one entry for each track."""
+    columns: dict[str, Any] = {
+        "id": np.ascontiguousarray(states.ids),
+        "name": states.names,
         "position": _places(states.positions),
-        "seen": states.is_seen.tolist(),
+        "seen": states.is_seen,
     }
-    if states.velocities is not None:
-        columns["velocity"] = _places(states.velocities)
-    if states.existence is not None:
-        columns["existence"] = [None if math.isnan(p) else p for p in states.existence.tolist()]
-    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    if (velocities := states.velocities) is not None:
+        columns["velocity"] = _places(velocities)
+    if (existence := states.existence) is not None:
+        columns["existence"] = existence  # null for NaN
+    return columns
 
 
-def _places(places: NDArray[np.float64]) -> list[Any]:
-    """Return coordinates as lists, and null for what is not finite, which JSON cannot hold."""
-    rows = places.tolist()
-    if not np.isfinite(places).all():
-        return [row if all(map(math.isfinite, row)) else None for row in rows]
-    return rows
+def _places(places: NDArray[np.float64]) -> Any:
+    """Return coordinates as JSON holds them: null for a row that is not finite."""
+    if np.isfinite(places).all():
+        return np.ascontiguousarray(places)
+    return [row if all(map(math.isfinite, row)) else None for row in places.tolist()]
