@@ -1,7 +1,7 @@
 """What the choice of the clip is worth: `auto` beside every single default, on scenes and captures.
 
 The scenes of `scenes.py`, also through four cameras, and the captures of `identity.py` in its four
-conditions; GNN, SMP over three frames and MCMCDA, alone and stitched.
+conditions; GNN, SMP over three frames, TOMHT and MCMCDA, alone and stitched.
 
     python benchmarks/which_method.py [--seeds N] [--data FOLDER] [--points N] [--markdown FILE]
 """
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 METHODS: dict[str, am.tracking.Method[Any]] = {
     "gnn": am.GNN(),
     "smp, window=3": am.SMP(window=3),
+    "tomht": am.TOMHT(),
     "mcmcda": am.MCMCDA(),
 }
 WAYS = [way for name in METHODS for way in (name, f"{name}, stitched")]
@@ -50,8 +51,9 @@ def row_of(group: str, truth: am.Tracks) -> Row:
         idf1[name] = am.evaluate(am.track(d, method, model=model, seed=0), truth).idf1
         stitched = am.track(d, method, model=model, seed=0, stitch=True)
         idf1[f"{name}, stitched"] = am.evaluate(stitched, truth).idf1
-    choice = am.tracking.choose_method(d, model)
-    return Row(group=group, idf1=idf1, chosen=way_of(choice.method.name, choice.stitch))
+    recipe = am.track(d, model=model, seed=0).recipe
+    assert recipe is not None
+    return Row(group=group, idf1=idf1, chosen=way_of(recipe.method, recipe.stitch))
 
 
 def way_of(method: str, stitch: bool) -> str:

@@ -132,7 +132,7 @@ def instances():
         am.model.Gap(track=3, first=10, last=20, seconds=1 / 3),
         am.tracking.learn_bonds(truth), am.learn_marker_set(truth),
         am.name_tracks(tracks, am.learn_marker_set(truth)),
-        am.tracking.Tracked(tracks=tracks),
+        am.tracking.Tracked(tracks=tracks, recipe=tracks.recipe),
         settings := am.batch.Settings(method="smp", options={"window": 3}, model=plain, seed=7),
         job := am.batch.Job(
             source=LONG, name=LONG, output=LONG, format="c3d", settings=settings, markers=(LONG,)
@@ -158,7 +158,7 @@ def instances():
             before=np.zeros(9), after=np.ones(9), stretches=(), names={},
         ),
         am.tracking.Correction(truth, plain),
-        am.edit.Session(am.track(d).recipe, without_edits(am.track(d).recipe, d), Path(LONG)),
+        am.edit.Session(without_edits(am.track(d).recipe, d), Path(LONG)),
         am.large.LargeTracker(model=plain, tile=1 / 3), am.large.LargeTracker(model=plain).init(),
         am.large.Columns(axes=(LONG, LONG), label=LONG[:70]),
         am.large.DecidedFrame(number=3, labels=np.zeros(9, dtype=int)),

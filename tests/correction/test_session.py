@@ -161,8 +161,8 @@ def test_an_answer_about_two_exchanged_tracks_states_what_is_true(tmp_path):
     labels[inside & (truth.labels == a)], labels[inside & (truth.labels == b)] = b, a
     tracks = am.Tracks(detections=d, labels=labels)
     model = am.estimate_model(d).model
-    begun = Uncorrected(tracks=tracks, model=model, stitching=None, naming=None)
-    session = Session(am.tracking.plan_tracking(d).recipe, begun, tmp_path / "e.toml")
+    recipe = am.tracking.plan_tracking(d).recipe
+    session = Session(Uncorrected(tracks=tracks, recipe=recipe, model=model), tmp_path / "e.toml")
     decision = Decision(kind="identity", track=a, first=100, last=179, n_detections=80)
     edit = session.choose(decision, Alternative(track=b, probability=0.5))
     # The detection of track b that is nearest in time is of marker a, as both were exchanged.

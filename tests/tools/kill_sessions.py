@@ -75,7 +75,7 @@ def kill_one(session: Session, path: Path, seed: int) -> int:
 
 async def _run(session: Session, path: Path, seed: int, writer: int) -> None:
     """Carry out steps until the process is killed; write each before and after."""
-    own = Session(session.recipe, session.begun, path)
+    own = Session(session.begun, path)
     hub = Hub(own, path.with_suffix(".c3d"))
     rng = np.random.default_rng([seed, 1])
     n, undone = own.tracks.detections.n_points, []

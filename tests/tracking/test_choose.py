@@ -75,6 +75,55 @@ def test_no_method_is_the_one_that_was_chosen():
     assert named.recipe.chosen == ""
 
 
+@pytest.fixture(scope="module")
+def fast():
+    """A walk at a quarter of the rate, in which SMP exchanges markers, and its tracks."""
+    walk = am.simulate.person(activity="walk", frames=300, seed=11)
+    truth = am.simulate.corrupt(walk, missing=0.1, clutter=0.1, noise=3e-4, stride=4, seed=11)
+    return truth, am.track(truth.detections)
+
+
+def test_where_identities_are_uncertain_the_more_certain_result_is_kept(fast):
+    truth, tracks = fast
+    d, recipe = truth.detections, tracks.recipe
+    assert (recipe.method, recipe.also) == ("tomht", ())
+    alone = {
+        method.name: am.track(d, method, model=recipe.model, seed=0, stitch=True)
+        for method in (am.SMP(window=3), am.TOMHT())
+    }
+    np.testing.assert_array_equal(tracks.labels, alone["tomht"].labels)
+    shares = {name: 100 * each.identity_confidence.mean() for name, each in alone.items()}
+    assert shares["smp"] < shares["tomht"]
+    for name, share in shares.items():
+        assert f"{share:.1f} %" in recipe.reason, name
+    idf1 = {name: am.evaluate(each, truth).idf1 for name, each in alone.items()}
+    assert idf1["smp"] < idf1["tomht"] - 0.002
+
+
+def test_a_recipe_repeats_the_kept_method_alone(fast):
+    truth, tracks = fast
+    again = am.track(truth.detections, recipe=tracks.recipe)
+    assert again.recipe == tracks.recipe
+    np.testing.assert_array_equal(again.identity_confidence, tracks.identity_confidence)
+    plan = am.tracking.plan_tracking(truth.detections)
+    assert plan.recipe.also == ("tomht",)
+    assert am.model.Recipe.from_dict(plan.recipe.to_dict()) == plan.recipe
+    planned = am.track(truth.detections, recipe=plan.recipe)
+    assert planned.recipe == tracks.recipe
+    np.testing.assert_array_equal(planned.labels, tracks.labels)
+
+
+def test_certain_identities_need_no_second_method(monkeypatch):
+    truth, model = clip("bodies")
+
+    def never(*_, **__):
+        raise AssertionError("a second method")
+
+    monkeypatch.setattr("asterism.tracking.methods.tomht.TOMHT._tracker", never)
+    tracks = am.track(truth.detections, model=model)
+    assert (tracks.recipe.method, tracks.recipe.also) == ("smp", ())
+
+
 def test_tracks_to_begin_with_are_for_mcmcda():
     truth = CLIPS["bodies"][0]()
     tracks = am.track(truth.detections, start=truth, seed=1)
@@ -144,6 +193,23 @@ def person(tmp_path, monkeypatch):
     )
     am.write(am.Tracks(detections=truth.detections, labels=np.full(len(truth.labels), -1)), "p.csv")
     return tmp_path
+
+
+def test_the_files_of_a_run_name_the_method_that_was_kept(tmp_path, monkeypatch, capsys, fast):
+    monkeypatch.chdir(tmp_path)
+    truth, _ = fast
+    am.write(am.Tracks(detections=truth.detections, labels=np.full(len(truth.labels), -1)), "p.csv")
+    assert main(["track", "p.csv", "--run", "run", "--report", "p.html"]) == 0
+    out = capsys.readouterr().out
+    assert "Tracked with tomht" in out
+    job = tomllib.loads((tmp_path / "run/run.toml").read_text())
+    assert job["method"]["name"] == "tomht"
+    assert "also" not in job["method"]
+    assert json.loads((tmp_path / "run/summary.json").read_text())["method"] == "tomht"
+    assert "Tracked with tomht" in (tmp_path / "p.html").read_text()
+    capsys.readouterr()
+    assert main(["track", "--from", "run/run.toml", "--run", "again", "--out", "q.csv"]) == 0
+    assert (tmp_path / "run/run.toml").read_bytes() == (tmp_path / "again/run.toml").read_bytes()
 
 
 def test_the_command_line_says_why_and_a_repeat_does_not_choose_again(person, capsys, monkeypatch):

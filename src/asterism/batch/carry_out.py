@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import logging
 import time
 from typing import TYPE_CHECKING
@@ -69,6 +70,7 @@ def carry_out(
     with writing_log(folder):
         run.write(folder / CONFIG)
         result, summary = _carry_out(run, capture, out, marker_sets, edits, progress)
+        dataclasses.replace(run, recipe=result.recipe).write(folder / CONFIG)
         for name in DECISIONS:
             write_decisions(result.tracks, folder / name)
         write_text(folder / SUMMARY, to_json(summary.to_dict()) + "\n")
@@ -100,6 +102,8 @@ def _carry_out(
         start=capture.tracks if recipe.has_start else None,
     )  # fmt: skip
     tracks = result.tracks
+    if result.recipe.method != recipe.method:
+        log.info("method selected: %s", result.recipe.chosen)
     seconds = time.perf_counter() - start
     if capture.n_points and not tracks.n_tracks:
         log.warning(
@@ -108,7 +112,7 @@ def _carry_out(
             capture.path,
         )
     write(tracks, out, format=run.format)
-    summary = summarize(result, out=out, method=recipe.method, seconds=seconds)
+    summary = summarize(result, out=out, method=result.recipe.method, seconds=seconds)
     for name, text in summary.rows():
         log.info("%s %s", name, text)
     return result, summary

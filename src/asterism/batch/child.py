@@ -106,9 +106,8 @@ def _track(
         capture, made, model=settings.model, stitch=settings.stitch, seed=settings.seed,
         marker_sets=sets, edits=edits, fill=settings.fill,
     )  # fmt: skip
-    recipe = plan.recipe
     run = Run(
-        recipe=recipe, source=job.source, format=job.format, markers=job.markers,
+        recipe=plan.recipe, source=job.source, format=job.format, markers=job.markers,
         edits=() if job.edits is None else (job.edits,),
     )  # fmt: skip
     last = 0.0
@@ -117,16 +116,16 @@ def _track(
         nonlocal last
         if time.monotonic() - last > _SECONDS:
             last = time.monotonic()
-            tell(f"tracking with {recipe.method}", done, capture.n_frames)
+            tell(f"tracking with {plan.method.name}", done, capture.n_frames)
 
     result, summary = carry_out(run, capture, out, marker_sets=sets, edits=edits, progress=advance)
-    run.write(run_folder / CONFIG)
+    dataclasses.replace(run, recipe=result.recipe).write(run_folder / CONFIG)
     for name in DECISIONS:
         write_decisions(result.tracks, run_folder / name)
     if job.page is not None:
         tell("writing the report", 0, 0)
         named = dataclasses.replace(summary, output=job.output)
-        write_page(result, folder / RESULT / job.page, recipe, plan.estimate, named, timed=False)
+        write_page(result, folder / RESULT / job.page, plan.estimate, named, timed=False)
     values = summary.to_dict() | {"input": job.source, "output": job.output}
     for name in ("seconds", "frames_per_second"):  # the same input gives the same bytes
         del values[name]

@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from asterism.batch.summary import Summary
-    from asterism.model import Recipe
     from asterism.tracking import ModelEstimate, Tracked
 
 __all__ = ["flat", "write_page"]
@@ -20,7 +19,6 @@ __all__ = ["flat", "write_page"]
 def write_page(
     result: Tracked,
     page: Path,
-    recipe: Recipe,
     estimate: ModelEstimate | None,
     summary: Summary,
     *,
@@ -34,8 +32,6 @@ def write_page(
         Result of the run.
     page : Path
         Page to write.
-    recipe : Recipe
-        Recipe of the run.
     estimate : ModelEstimate or None
         Estimate of the model; None if it was given.
     summary : Summary
@@ -43,6 +39,7 @@ def write_page(
     timed : bool
         Whether the page states the running time, which differs from run to run.
     """
+    recipe = result.recipe
     stitched = ", then stitched" if recipe.stitch else ""
     options = ", ".join(f"{name}={value}" for name, value in flat(recipe.options).items())
     rows = [("method", recipe.method + stitched)]

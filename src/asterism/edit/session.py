@@ -12,7 +12,7 @@ from asterism.checks import check_kind, check_path
 from asterism.errors import FormatError, ParameterError
 from asterism.io import read_edits, write, write_edits
 from asterism.model import Decision, Detections, Edit, Recipe
-from asterism.model.recipe import hash_of_edits, sha256_of
+from asterism.model.recipe import sha256_of
 from asterism.tracking import Correction, Tracked, assess, fill_gaps, plan_tracking
 from asterism.tracking.correction import settled
 from asterism.tracking.pipeline import Uncorrected, conclude, without_edits
@@ -35,10 +35,8 @@ class Session:
 
     Parameters
     ----------
-    recipe : Recipe
-        Settings of the tracking, without edits.
     begun : Uncorrected
-        Result of its steps before edits.
+        Result of a recipe before any edit.
     path : Path
         File of the edits.
     who : str
@@ -55,8 +53,8 @@ class Session:
     1
     """
 
-    def __init__(self, recipe: Recipe, begun: Uncorrected, path: Path, who: str = "") -> None:
-        self.recipe, self.begun, self.path, self.who = recipe, begun, path, who
+    def __init__(self, begun: Uncorrected, path: Path, who: str = "") -> None:
+        self.begun, self.path, self.who = begun, path, who
         self._correction = Correction(begun.tracks, begun.model, begun.stitching)
         self._undone: list[Edit] = []
         self._sha256 = sha256_of(begun.tracks.detections)
@@ -107,7 +105,7 @@ class Session:
             recipe = plan_tracking(detections, marker_sets=marker_sets).recipe
         recipe = dataclasses.replace(recipe, edits="")
         begun = without_edits(recipe, detections, marker_sets=marker_sets, progress=progress)
-        session = cls(recipe, begun, path, who)
+        session = cls(begun, path, who)
         for edit in edits:
             session._correction.apply(edit)
         return session
@@ -300,7 +298,9 @@ class Session:
             Standard deviation of a coordinate, metres.
         """
         edit = self.fill(track, first, last)
-        tracks = fill_gaps(self.tracks, model=self.recipe.model, longest=0.0, edits=(edit,)).tracks
+        tracks = fill_gaps(
+            self.tracks, model=self.begun.recipe.model, longest=0.0, edits=(edit,)
+        ).tracks
         d = tracks.detections
         if d.filled is None or d.stds is None:
             raise ParameterError("track", "a gap of these frames", f"track {track}")
@@ -336,12 +336,7 @@ class Session:
 
     def result(self) -> Tracked:
         """Return what ``am.track`` returns for these edits."""
-        recipe = dataclasses.replace(self.recipe, edits=hash_of_edits(self.edits))
-        begun = self.begun
-        if begun.tracks.recipe is not None:
-            tracks = dataclasses.replace(begun.tracks, recipe=recipe)
-            begun = dataclasses.replace(begun, tracks=tracks)
-        return conclude(recipe, begun, self.edits)
+        return conclude(self.begun, self.edits)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write the corrected tracks, never over the input.

@@ -100,6 +100,10 @@ class Recipe:
         Hash of the detections and of the initial labels.
     versions : dict of str
         Versions of the software on which the result can depend.
+    also : tuple of str
+        Names of further methods, with their default options, that are tried where identities of
+        the first one are uncertain. The recipe of a result has none: its method is the one that
+        made it.
 
     Examples
     --------
@@ -126,6 +130,7 @@ class Recipe:
     fill: bool
     input_hash: InputHash
     versions: dict[str, str]
+    also: tuple[str, ...] = ()
 
     @property
     def sha256(self) -> str:
@@ -133,12 +138,16 @@ class Recipe:
         return self.input_hash.sha256
 
     @property
+    def label(self) -> str:
+        """Method in a few words, with the number of frames of `SMP`."""
+        window = self.options.get("window")
+        return f"{self.method}, window={window}" if self.method == "smp" and window else self.method
+
+    @property
     def chosen(self) -> str:
         """Method and reason in one line; empty if the caller named the method."""
-        window = self.options.get("window")
-        options = f", window={window}" if self.method == "smp" and window else ""
         stitched = ", then stitched" if self.stitch else ""
-        return f"{self.method}{options}{stitched}: {self.reason}" if self.reason else ""
+        return f"{self.label}{stitched}: {self.reason}" if self.reason else ""
 
     def to_dict(self) -> dict[str, dict[str, Any]]:
         """Return the recipe as nested plain values, in the form of a TOML file.
@@ -158,6 +167,7 @@ class Recipe:
                 "start": self.has_start,
                 "stitch": self.stitch,
                 **({"reason": self.reason} if self.reason else {}),
+                **({"also": list(self.also)} if self.also else {}),
                 # TOML has no null value.
                 "options": _replaced(self.options, None, NONE),
             },
@@ -191,7 +201,7 @@ class Recipe:
         check_fields("recipe", map(str, values), sections)
         method, names = _table(values, "method"), _table(values, "names")
         check_fields("names", map(str, names), ("markers", "edits", "fill"))
-        keys = ("name", "seed", "start", "stitch", "reason", "options")
+        keys = ("name", "seed", "start", "stitch", "reason", "also", "options")
         check_fields("method", map(str, method), keys)
         if (seed := method.get("seed")) is not None:
             check_number("method.seed", seed, above=0, closed=True, integer=True)
@@ -208,6 +218,7 @@ class Recipe:
             fill=_value(names, "names.fill", bool),
             input_hash=InputHash(_value(_table(values, "input"), "input.sha256", str)),
             versions={str(k): str(v) for k, v in _table(values, "versions").items()},
+            also=tuple(map(str, _value({"also": [], **method}, "method.also", list))),
         )
 
 

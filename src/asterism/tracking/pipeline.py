@@ -15,7 +15,7 @@ from asterism.tracking.confidence import assess
 from asterism.tracking.correction import correct, settled
 from asterism.tracking.decisions import of_filling, of_naming, of_stitching
 from asterism.tracking.filling import LONGEST, fill_gaps
-from asterism.tracking.methods import METHODS, method_by_name
+from asterism.tracking.methods import METHODS, method_by_name, options_of
 from asterism.tracking.methods.associate import associate
 from asterism.tracking.naming import name_tracks
 from asterism.tracking.plan import hash_of_names, plan_tracking
@@ -34,6 +34,10 @@ __all__ = ["Tracked", "Uncorrected", "carry_out", "conclude", "track", "without_
 
 log = logging.getLogger(__name__)
 
+DOUBTFUL = 0.002
+"""Share of the detections whose identity is expected to be wrong, from which further methods are
+tried."""
+
 
 @record(eq=False)
 class Tracked:
@@ -43,6 +47,8 @@ class Tracked:
     ----------
     tracks : Tracks
         Result of the last step.
+    recipe : Recipe
+        Recipe as it was carried out; its method is the one that made the tracks.
     naming : Naming, optional
         Names with their probabilities; None without marker sets and own names.
     filling : Filling, optional
@@ -57,6 +63,7 @@ class Tracked:
     """
 
     tracks: Tracks
+    recipe: Recipe
     naming: Naming | None = None
     filling: Filling | None = None
 
@@ -200,7 +207,7 @@ def carry_out(
     begun = without_edits(
         recipe, detections, method, start=start, marker_sets=marker_sets, progress=progress
     )
-    return conclude(recipe, begun, edits)
+    return conclude(begun, edits)
 
 
 @record(eq=False)
@@ -211,6 +218,8 @@ class Uncorrected:
     ----------
     tracks : Tracks
         Associated, stitched and named tracks.
+    recipe : Recipe
+        Recipe as it was carried out; its method is the one that made the tracks.
     model : TrackingModel
         Model with which they were associated.
     stitching : Stitching, optional
@@ -220,9 +229,10 @@ class Uncorrected:
     """
 
     tracks: Tracks
+    recipe: Recipe
     model: TrackingModel
-    stitching: Stitching | None
-    naming: Naming | None
+    stitching: Stitching | None = None
+    naming: Naming | None = None
 
 
 def without_edits(
@@ -242,6 +252,25 @@ def without_edits(
         As for `carry_out`.
     """
     _warn_of_versions(recipe)
+    found = _associated(recipe, detections, method, start, progress)
+    if recipe.also:
+        found = _most_certain(found, recipe.also, detections, progress)
+    tracks = found.tracks
+    if not recipe.markers:
+        return found
+    naming = name_tracks(tracks, *(marker_sets or ()))
+    return dataclasses.replace(found, tracks=naming.tracks, naming=naming)
+
+
+def _associated(
+    recipe: Recipe,
+    detections: Detections,
+    method: Method[Any] | None,
+    start: Tracks | None,
+    progress: Callable[[int], Any] | None,
+) -> Uncorrected:
+    """Associate by the method of a recipe, and stitch."""
+    recipe = dataclasses.replace(recipe, also=())
     made = method_by_name(recipe.method, **recipe.options) if method is None else method
     model = tracklet_model(recipe.model) if recipe.stitch else recipe.model
     carried = recipe if made.name in METHODS else None
@@ -253,27 +282,67 @@ def without_edits(
     stitching = stitch_tracklets(tracks, model) if recipe.stitch else None
     if stitching is not None:
         tracks = dataclasses.replace(stitching.tracks, recipe=carried)
-    naming = name_tracks(tracks, *(marker_sets or ())) if recipe.markers else None
-    tracks = tracks if naming is None else naming.tracks
-    return Uncorrected(tracks=tracks, model=model, stitching=stitching, naming=naming)
+    return Uncorrected(tracks=tracks, recipe=recipe, model=model, stitching=stitching)
 
 
-def conclude(recipe: Recipe, begun: Uncorrected, edits: Sequence[Edit] = ()) -> Tracked:
+def _most_certain(
+    first: Uncorrected,
+    also: Sequence[str],
+    detections: Detections,
+    progress: Callable[[int], Any] | None,
+) -> Uncorrected:
+    """Try further methods while identities are uncertain; return the most certain result.
+
+    The sum of the identity confidences is the number of detections whose identity is expected to be
+    right.
+    """
+    best, n_best = first, _n_right(first)
+    for name in also:
+        n_labelled = int((best.tracks.labels >= 0).sum())
+        if n_labelled - n_best <= DOUBTFUL * detections.n_points:
+            break
+        before, own = best.recipe, method_by_name(name)
+        recipe = dataclasses.replace(before, method=name, options=options_of(own))
+        other = _associated(recipe, detections, own, None, progress)
+        n_other = _n_right(other)
+        if n_other > n_best:
+            share, more = (100 * n / detections.n_points for n in (n_best, n_other))
+            reason = (
+                f"{before.reason}; {more:.1f} % of the detections are expected to have the right "
+                f"identity, against {share:.1f} % with {before.label}"
+            )
+            recipe = dataclasses.replace(recipe, reason=reason)
+            tracks = dataclasses.replace(other.tracks, recipe=recipe)
+            best, n_best = dataclasses.replace(other, tracks=tracks, recipe=recipe), n_other
+    return best
+
+
+def _n_right(found: Uncorrected) -> float:
+    """Return the expected number of detections with the right identity."""
+    confidence = _assessed(found, found.tracks).identity_confidence
+    assert confidence is not None
+    return float(confidence.sum())
+
+
+def _assessed(found: Uncorrected, tracks: Tracks) -> Tracks:
+    threads = found.recipe.options.get("threads", 1)
+    return assess(tracks, found.model, found.stitching, threads=threads)
+
+
+def conclude(begun: Uncorrected, edits: Sequence[Edit] = ()) -> Tracked:
     """Carry out the other steps of a recipe: correct, assess and fill.
 
     Parameters
     ----------
-    recipe : Recipe
-        Settings.
     begun : Uncorrected
         Result of the steps before.
     edits : sequence of Edit
         Edits, in their order.
     """
     model, stitching, naming = begun.model, begun.stitching, begun.naming
+    recipe = dataclasses.replace(begun.recipe, edits=hash_of_edits(edits))
     tracks = correct(begun.tracks, edits, model, stitching) if edits else begun.tracks
-    threads = recipe.options.get("threads", 1)
-    tracks = settled(assess(tracks, model, stitching, threads=threads), edits)
+    tracks = settled(_assessed(begun, tracks), edits)
     decisions = tracks.decisions
     if stitching is not None:
         decisions += of_stitching(stitching, tracks)
@@ -286,8 +355,9 @@ def conclude(recipe: Recipe, begun: Uncorrected, edits: Sequence[Edit] = ()) -> 
         filling = fill_gaps(tracks, model=recipe.model, edits=edits, longest=longest)
         tracks = filling.tracks
         decisions += of_filling(filling)
-    tracks = dataclasses.replace(tracks, decisions=decisions)
-    return Tracked(tracks=tracks, naming=naming, filling=filling)
+    carried = None if tracks.recipe is None else recipe
+    tracks = dataclasses.replace(tracks, decisions=decisions, recipe=carried)
+    return Tracked(tracks=tracks, recipe=recipe, naming=naming, filling=filling)
 
 
 def _check_recipe(

@@ -72,10 +72,10 @@ def demo(
         plan = am.tracking.plan_tracking(
             capture, method, model=estimate.model, stitch=stitch, seed=seed
         )
-        why_all += plan.recipe.chosen or ""
         run = Run(recipe=plan.recipe, source=str(out / "capture.c3d"), format="c3d")
         result, summary = carry_out(run, capture, folder / "tracked.c3d", folder=folder)
         tracks = result.tracks
+        why_all += result.recipe.chosen
         am.write(tracks, folder / "tracked.csv")
         _draw(tracks, truth, folder)
         found = am.evaluate(tracks, truth).to_dict()

@@ -215,13 +215,15 @@ def track(
         )
     if report is not None:
         with progress("writing the report"):
-            write_page(result, report, recipe, estimate, summary)
+            write_page(result, report, estimate, summary)
     if prints:
+        if result.recipe.method != recipe.method:
+            print_table([("method", result.recipe.chosen)])
         rows = summary.rows() + ([("report", str(report))] if report is not None else [])
-        print_table(rows, title=f"\nTracked with {recipe.method}")
+        print_table(rows, title=f"\nTracked with {result.recipe.method}")
     if json:
         page = {} if report is None else {"report": str(report)}
-        print_json(summary.to_dict() | _settings_of(recipe) | page)
+        print_json(summary.to_dict() | _settings_of(result.recipe) | page)
 
 
 def _check_start(method: str | None, capture: am.Capture, source: Path) -> None:
