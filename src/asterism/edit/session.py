@@ -15,7 +15,7 @@ from asterism.model import Decision, Detections, Edit, Recipe
 from asterism.model.recipe import sha256_of
 from asterism.tracking import Correction, Tracked, assess, fill_gaps, plan_tracking
 from asterism.tracking.correction import settled
-from asterism.tracking.pipeline import Uncorrected, conclude, without_edits
+from asterism.tracking.pipeline import conclude, without_edits
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from asterism.model import Alternative, MarkerSet, Tracks
     from asterism.tracking import Change
+    from asterism.tracking.attempts import Uncorrected
 
 __all__ = ["Session"]
 

@@ -100,10 +100,10 @@ class Recipe:
         Hash of the detections and of the initial labels.
     versions : dict of str
         Versions of the software on which the result can depend.
-    also : tuple of str
-        Names of further methods, with their default options, that are tried where identities of
-        the first one are uncertain. The recipe of a result has none: its method is the one that
-        made it.
+    retry : bool
+        Whether identities that are uncertain are estimated in further ways: by another method, and
+        by a marker set learnt from the tracks. The most certain result is kept, and its recipe
+        names the method that made it.
 
     Examples
     --------
@@ -130,7 +130,7 @@ class Recipe:
     fill: bool
     input_hash: InputHash
     versions: dict[str, str]
-    also: tuple[str, ...] = ()
+    retry: bool = False
 
     @property
     def sha256(self) -> str:
@@ -166,8 +166,8 @@ class Recipe:
                 **({} if self.seed is None else {"seed": self.seed}),
                 "start": self.has_start,
                 "stitch": self.stitch,
+                "retry": self.retry,
                 **({"reason": self.reason} if self.reason else {}),
-                **({"also": list(self.also)} if self.also else {}),
                 # TOML has no null value.
                 "options": _replaced(self.options, None, NONE),
             },
@@ -201,7 +201,7 @@ class Recipe:
         check_fields("recipe", map(str, values), sections)
         method, names = _table(values, "method"), _table(values, "names")
         check_fields("names", map(str, names), ("markers", "edits", "fill"))
-        keys = ("name", "seed", "start", "stitch", "reason", "also", "options")
+        keys = ("name", "seed", "start", "stitch", "retry", "reason", "options")
         check_fields("method", map(str, method), keys)
         if (seed := method.get("seed")) is not None:
             check_number("method.seed", seed, above=0, closed=True, integer=True)
@@ -218,7 +218,7 @@ class Recipe:
             fill=_value(names, "names.fill", bool),
             input_hash=InputHash(_value(_table(values, "input"), "input.sha256", str)),
             versions={str(k): str(v) for k, v in _table(values, "versions").items()},
-            also=tuple(map(str, _value({"also": [], **method}, "method.also", list))),
+            retry=_value({"retry": False, **method}, "method.retry", bool),
         )
 
 

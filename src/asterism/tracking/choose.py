@@ -47,10 +47,6 @@ CLEAR = 0.01
 """Largest number of rival detections per link at which the association is unambiguous."""
 
 
-ALSO_ON_BODIES = ("tomht",)
-"""Methods that are tried too where identities on bodies are uncertain."""
-
-
 @record
 class Choice:
     """Method selected for a capture, with the reason.
@@ -63,8 +59,6 @@ class Choice:
         Whether the tracklets of the method are to be stitched.
     reason : str
         What was measured in the capture and what follows from it, in one line.
-    also : tuple of str
-        Methods that are tried as well where identities are uncertain (`asterism.model.Recipe`).
 
     Examples
     --------
@@ -80,7 +74,6 @@ class Choice:
     method: Method[Any]
     stitch: bool
     reason: str
-    also: tuple[str, ...] = ()
 
 
 def choose_method(
@@ -90,8 +83,7 @@ def choose_method(
 
     - Given initial tracks: `MCMCDA`, the only method that repairs them.
     - Markers that keep their distance to another one, as on bodies: `SMP` over three frames with
-      stitching, because neighbours predict where an occluded marker reappears. Where identities
-      remain uncertain, `TOMHT` is tried as well, and the more certain result is kept.
+      stitching, because neighbours predict where an occluded marker reappears.
     - Markers that move by a random walk, or that enter each other's gates: `MCMCDA`.
     - Any other capture is unambiguous: `GNN`.
 
@@ -135,7 +127,7 @@ def choose_method(
     n_rigid, n_compared = partners(tracks, model.sensor.noise_sigma)
     if n_compared and n_rigid >= ON_BODIES * n_compared:
         reason = f"{n_rigid} of {n_compared} tracks have a stable distance to another: bodies"
-        return on_bodies(reason)
+        return Choice(method=SMP(window=3), stitch=True, reason=reason)
     if any(isinstance(mode, RandomWalk) for mode in model.motion.modes):
         return Choice(
             method=MCMCDA(), stitch=False, reason="the motion is a random walk, no bodies"
@@ -148,17 +140,6 @@ def choose_method(
     if rivals > CLEAR:
         return Choice(method=MCMCDA(), stitch=False, reason=rate)
     return Choice(method=method, stitch=False, reason=rate)
-
-
-def on_bodies(reason: str) -> Choice:
-    """Return the selection for a capture of bodies.
-
-    Parameters
-    ----------
-    reason : str
-        Why it is one.
-    """
-    return Choice(method=SMP(window=3), stitch=True, reason=reason, also=ALSO_ON_BODIES)
 
 
 def partners(tracks: Tracks, noise_sigma: float) -> tuple[int, int]:

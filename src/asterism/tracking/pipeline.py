@@ -11,16 +11,12 @@ from asterism.errors import ParameterError
 from asterism.model import Detections, Edit, MarkerSet, Recipe, TrackingModel, Tracks
 from asterism.model.recipe import hash_of_edits, sha256_of, versions
 from asterism.records import record
-from asterism.tracking.confidence import assess
+from asterism.tracking.attempts import Uncorrected, assessed, attempt, most_certain
 from asterism.tracking.correction import correct, settled
 from asterism.tracking.decisions import of_filling, of_naming, of_stitching
 from asterism.tracking.filling import LONGEST, fill_gaps
-from asterism.tracking.methods import METHODS, method_by_name, options_of
-from asterism.tracking.methods.associate import associate
 from asterism.tracking.naming import name_tracks
 from asterism.tracking.plan import hash_of_names, plan_tracking
-from asterism.tracking.stitching import stitch as stitch_tracklets
-from asterism.tracking.stitching import tracklet_model
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -28,15 +24,10 @@ if TYPE_CHECKING:
     from asterism.tracking.filling import Filling
     from asterism.tracking.methods import Method
     from asterism.tracking.naming import Naming
-    from asterism.tracking.stitching import Stitching
 
-__all__ = ["Tracked", "Uncorrected", "carry_out", "conclude", "track", "without_edits"]
+__all__ = ["Tracked", "carry_out", "conclude", "track", "without_edits"]
 
 log = logging.getLogger(__name__)
-
-DOUBTFUL = 0.002
-"""Share of the detections whose identity is expected to be wrong, from which further methods are
-tried."""
 
 
 @record(eq=False)
@@ -127,8 +118,9 @@ def track(
         repeats the call (None for a method that is not in `METHODS`). If no method was given,
         ``recipe.chosen`` is the selected method and the reason. ``info["log_posterior"]`` is the
         score by which methods are compared (`log_posterior`);
-        stitched tracks have none, because the model excludes gaps of that length. The rest of
-        ``info`` depends on the method.
+        stitched tracks have none, because the model excludes gaps of that length.
+        ``info["refinements"]`` tells how often tracks whose identities were uncertain have been
+        named by a marker set learnt from them. The rest of ``info`` depends on the method.
 
     Raises
     ------
@@ -210,31 +202,6 @@ def carry_out(
     return conclude(begun, edits)
 
 
-@record(eq=False)
-class Uncorrected:
-    """Tracks of a recipe before any edit, with what the later steps need.
-
-    Parameters
-    ----------
-    tracks : Tracks
-        Associated, stitched and named tracks.
-    recipe : Recipe
-        Recipe as it was carried out; its method is the one that made the tracks.
-    model : TrackingModel
-        Model with which they were associated.
-    stitching : Stitching, optional
-        Stitching that made them.
-    naming : Naming, optional
-        Names with their probabilities.
-    """
-
-    tracks: Tracks
-    recipe: Recipe
-    model: TrackingModel
-    stitching: Stitching | None = None
-    naming: Naming | None = None
-
-
 def without_edits(
     recipe: Recipe,
     detections: Detections,
@@ -252,81 +219,13 @@ def without_edits(
         As for `carry_out`.
     """
     _warn_of_versions(recipe)
-    found = _associated(recipe, detections, method, start, progress)
-    if recipe.also:
-        found = _most_certain(found, recipe.also, detections, progress)
-    tracks = found.tracks
+    found = attempt(recipe, detections, method, start=start, progress=progress)
+    if recipe.retry:
+        found = most_certain(found, detections, progress=progress)
     if not recipe.markers:
         return found
-    naming = name_tracks(tracks, *(marker_sets or ()))
+    naming = name_tracks(found.tracks, *(marker_sets or ()))
     return dataclasses.replace(found, tracks=naming.tracks, naming=naming)
-
-
-def _associated(
-    recipe: Recipe,
-    detections: Detections,
-    method: Method[Any] | None,
-    start: Tracks | None,
-    progress: Callable[[int], Any] | None,
-) -> Uncorrected:
-    """Associate by the method of a recipe, and stitch."""
-    recipe = dataclasses.replace(recipe, also=())
-    made = method_by_name(recipe.method, **recipe.options) if method is None else method
-    model = tracklet_model(recipe.model) if recipe.stitch else recipe.model
-    carried = recipe if made.name in METHODS else None
-    # Stitched tracks have no log posterior.
-    tracks = associate(
-        made, detections, model, seed=recipe.seed, start=start, recipe=carried,
-        score=not recipe.stitch, progress=progress,
-    )  # fmt: skip
-    stitching = stitch_tracklets(tracks, model) if recipe.stitch else None
-    if stitching is not None:
-        tracks = dataclasses.replace(stitching.tracks, recipe=carried)
-    return Uncorrected(tracks=tracks, recipe=recipe, model=model, stitching=stitching)
-
-
-def _most_certain(
-    first: Uncorrected,
-    also: Sequence[str],
-    detections: Detections,
-    progress: Callable[[int], Any] | None,
-) -> Uncorrected:
-    """Try further methods while identities are uncertain; return the most certain result.
-
-    The sum of the identity confidences is the number of detections whose identity is expected to be
-    right.
-    """
-    best, n_best = first, _n_right(first)
-    for name in also:
-        n_labelled = int((best.tracks.labels >= 0).sum())
-        if n_labelled - n_best <= DOUBTFUL * detections.n_points:
-            break
-        before, own = best.recipe, method_by_name(name)
-        recipe = dataclasses.replace(before, method=name, options=options_of(own))
-        other = _associated(recipe, detections, own, None, progress)
-        n_other = _n_right(other)
-        if n_other > n_best:
-            share, more = (100 * n / detections.n_points for n in (n_best, n_other))
-            reason = (
-                f"{before.reason}; {more:.1f} % of the detections are expected to have the right "
-                f"identity, against {share:.1f} % with {before.label}"
-            )
-            recipe = dataclasses.replace(recipe, reason=reason)
-            tracks = dataclasses.replace(other.tracks, recipe=recipe)
-            best, n_best = dataclasses.replace(other, tracks=tracks, recipe=recipe), n_other
-    return best
-
-
-def _n_right(found: Uncorrected) -> float:
-    """Return the expected number of detections with the right identity."""
-    confidence = _assessed(found, found.tracks).identity_confidence
-    assert confidence is not None
-    return float(confidence.sum())
-
-
-def _assessed(found: Uncorrected, tracks: Tracks) -> Tracks:
-    threads = found.recipe.options.get("threads", 1)
-    return assess(tracks, found.model, found.stitching, threads=threads)
 
 
 def conclude(begun: Uncorrected, edits: Sequence[Edit] = ()) -> Tracked:
@@ -342,7 +241,7 @@ def conclude(begun: Uncorrected, edits: Sequence[Edit] = ()) -> Tracked:
     model, stitching, naming = begun.model, begun.stitching, begun.naming
     recipe = dataclasses.replace(begun.recipe, edits=hash_of_edits(edits))
     tracks = correct(begun.tracks, edits, model, stitching) if edits else begun.tracks
-    tracks = settled(_assessed(begun, tracks), edits)
+    tracks = settled(assessed(begun, tracks), edits)
     decisions = tracks.decisions
     if stitching is not None:
         decisions += of_stitching(stitching, tracks)

@@ -10,9 +10,9 @@ from asterism.errors import ParameterError
 from asterism.model import Capture, Detections, Edit, MarkerSet, Recipe, TrackingModel
 from asterism.model.recipe import InputHash, hash_of_edits, versions
 from asterism.records import record
-from asterism.tracking.choose import choose_method, on_bodies
+from asterism.tracking.choose import choose_method
 from asterism.tracking.estimation import estimate_model
-from asterism.tracking.methods import Method, method_by_name, options_of
+from asterism.tracking.methods import SMP, Method, method_by_name, options_of
 from asterism.tracking.naming.own_names import has_own_names
 
 if TYPE_CHECKING:
@@ -118,15 +118,13 @@ def plan_tracking(
         estimate = estimate_model(detections)
         model = estimate.model
     check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
-    reason, also = "", tuple[str, ...]()
-    if method is None:
-        if stitch is True and start is None:
-            choice = on_bodies("stitching is requested")
-        else:
-            choice = choose_method(detections, model, has_start=start is not None)
+    reason, is_chosen = "", method is None
+    if method is None and stitch is True and start is None:
+        method, reason = SMP(window=3), "stitching is requested"
+    elif method is None:
+        choice = choose_method(detections, model, has_start=start is not None)
         method, reason = choice.method, choice.reason
         stitch = choice.stitch if stitch == "auto" else stitch
-        also = choice.also if stitch else ()
     recipe = Recipe(
         method=method.name,
         options=options_of(method),
@@ -140,7 +138,7 @@ def plan_tracking(
         fill=fill,
         input_hash=InputHash((detections, None if start is None else start.labels)),
         versions=versions(),
-        also=also,
+        retry=is_chosen and stitch is True and start is None,
     )
     return Plan(recipe=recipe, method=method, estimate=estimate)
 
