@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "naming/window_scores.hpp"
@@ -14,17 +15,16 @@ namespace asterism {
 class NameWindow {
  public:
   // positions: (F, A, 3), NaN without a detection; marker: of each track, -1 for none.
-  NameWindow(std::vector<double> positions, std::vector<std::int32_t> marker,
+  NameWindow(std::int32_t F, std::vector<double> positions, std::vector<std::int32_t> marker,
              const NeighbourTables& tables)
-      : F_(static_cast<std::int32_t>(positions.size() / (3 * marker.size()))),
-        positions_(std::move(positions)), marker_(std::move(marker)), tables_(tables),
+      : F_(F), positions_(std::move(positions)), marker_(std::move(marker)), tables_(tables),
         holder_(tables.M, -1) {
     for (std::int32_t k = 0; k < n_tracks(); ++k)
       if (marker_[k] >= 0) holder_[marker_[k]] = k;
   }
 
   // The track that is examined in this turn, of those with a name and of those without one that
-  // exist in all frames; -1 for none.
+  // exist in all frames; -1 for none, and without two tracks, between which there is a distance.
   std::int32_t turn_of_named(std::int64_t turn) const {
     return in_turn(turn, [&](std::int32_t k) { return marker_[k] >= 0; });
   }
@@ -87,6 +87,7 @@ class NameWindow {
   template <typename Condition>
   std::int32_t in_turn(std::int64_t turn, Condition&& condition) const {
     std::vector<std::int32_t> found;
+    if (n_tracks() < 2) return -1;
     for (std::int32_t k = 0; k < n_tracks(); ++k)
       if (condition(k)) found.push_back(k);
     return found.empty() ? -1 : found[static_cast<std::size_t>(turn) % found.size()];

@@ -221,7 +221,8 @@ class LastTracks {
              const In<std::int64_t>& neighbours, const In<double>& distances,
              const In<double>& variances, const In<double>& weights)
       : tables_(neighbours, distances, variances, weights), labels_(labels_of(frames)),
-        window_(positions(frames), markers(marker_of), std::apply(neighbour_tables, tables_)) {}
+        window_(static_cast<std::int32_t>(frames.size()), positions(frames), markers(marker_of),
+                std::apply(neighbour_tables, tables_)) {}
 
   const NameWindow& window() const { return window_; }
   std::int64_t label(std::int32_t k) const {
@@ -241,7 +242,6 @@ class LastTracks {
     require(!frames.empty(), "frames: at least one");
     std::vector<std::int64_t> labels = values_as<std::int64_t>(frames.back().second);
     std::erase_if(labels, [](std::int64_t k) { return k < 0; });
-    require(!labels.empty(), "frames: a track in the last one");
     std::ranges::sort(labels);
     return labels;
   }
@@ -252,10 +252,13 @@ class LastTracks {
     for (std::size_t f = 0; f < frames.size(); ++f) {
       require_frame(frames[f]);
       const auto& [points, labels] = frames[f];
+      auto at = labels_.begin();  // labels mostly rise in a frame
       for (std::size_t i = 0; i < labels.size(); ++i) {
-        const auto at = std::ranges::lower_bound(labels_, labels.data()[i]);
-        if (at == labels_.end() || *at != labels.data()[i]) continue;
+        const std::int64_t label = labels.data()[i];
+        if (at == labels_.end() || *at != label) at = std::ranges::lower_bound(labels_, label);
+        if (at == labels_.end() || *at != label) continue;
         place_point(points, i, &out[3 * (f * A + static_cast<std::size_t>(at - labels_.begin()))]);
+        ++at;
       }
     }
     return out;

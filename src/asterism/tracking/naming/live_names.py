@@ -122,7 +122,7 @@ class LiveNames:
         if turn % EVERY == 0:
             sums = _engine.with_distances(sums, self.marker_of, *recent[-1])
         after = _Changed(self.marker_of, dict(self.rivals), {})
-        if len(recent) == self.LENGTH and np.count_nonzero(recent[-1][1] >= 0) >= 2:
+        if len(recent) == self.LENGTH:
             window = _engine.LastTracks(
                 recent,
                 self.marker_of,
@@ -223,11 +223,11 @@ def _distances(
     sums: NDArray[np.float64], markers: NDArray[np.int64], first: int, n_markers: int
 ) -> Distances:
     """Return the distances from markers to those of one set, by their sums."""
-    own = sums[:, markers, first : first + n_markers]
-    count, total, squares = own[0], own[1], own[2]
+    count, total, squares = sums[:, markers, first : first + n_markers]
     n = np.maximum(count, 1)
-    middle = np.where(count > 0, total / n, np.nan)
-    spread = np.sqrt(np.maximum(squares / n - (total / n) ** 2, 0))
+    mean = total / n
+    middle = np.where(count > 0, mean, np.nan)
+    spread = np.sqrt(np.maximum(squares / n - mean * mean, 0))
     return Distances(middle=middle, spread=spread, n_frames=count)
 
 
