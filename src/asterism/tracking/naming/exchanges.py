@@ -28,6 +28,7 @@ SAMPLED = 60
 MIN_FRAMES = 5
 """Smallest number of sampled frames of a stretch, of the rest, and of a distance in each."""
 
+
 def without_exchanges(tracks: Tracks) -> Tracks:
     """Exchange two tracks back from where they have each other's marker.
 

@@ -17,11 +17,13 @@ if TYPE_CHECKING:
 
 __all__ = ["Subject"]
 
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Subject:
     """The steadiest neighbours of each of M markers, as tables of shape (M, R).
 
-    Distances are in metres; an infinite variance is unused (`engine/naming/measured_neighbours.hpp`).
+    Distances are in metres; an infinite variance is unused. The engine measures them
+    (`engine/naming/measured_neighbours.hpp`).
     """
 
     neighbours: NDArray[np.int64]
@@ -65,6 +67,4 @@ class Subject:
             spread=found.spread,
             n_frames=found.n_frames.astype(np.float64),
         )
-        return cls(
-            neighbours=neighbours, distances=distances, variances=variances, weights=weights
-        )
+        return cls(neighbours=neighbours, distances=distances, variances=variances, weights=weights)
