@@ -65,7 +65,9 @@ class ExchangedStretches {
   std::size_t at(std::int32_t i, std::int32_t j) const {
     return static_cast<std::size_t>(i) * K_ + j;
   }
-  const double* series(std::int32_t i, std::int32_t j) const { return distance_.data() + at(i, j) * F_; }
+  const double* series(std::int32_t i, std::int32_t j) const {
+    return distance_.data() + at(i, j) * F_;
+  }
 
   void measure(std::span<const double> positions, std::int32_t i, std::int32_t j) {
     known_.clear();
@@ -115,7 +117,8 @@ class ExchangedStretches {
     double n = 0, x = 0, y = 0, x2 = 0, y2 = 0, share = 0;  // share: 1 / n
 
     double spreads(const Sums& moved) const {
-      return variance(x + moved.move, x2 + moved.squares) * variance(y - moved.move, y2 - moved.squares);
+      return variance(x + moved.move, x2 + moved.squares) *
+             variance(y - moved.move, y2 - moved.squares);
     }
     double variance(double sum, double squares) const {
       const double mean = sum * share;
@@ -133,8 +136,9 @@ class ExchangedStretches {
       for (std::int32_t f = 0; f < F_; ++f) {
         Sums next = sums[f * C + c];
         if (!std::isnan(x[f]) && !std::isnan(y[f])) {
-          next = {next.n + 1, next.move + (y[f] - x[f]), next.squares + (y[f] * y[f] - x[f] * x[f])};
-          own = {own.n + 1, own.x + x[f], own.y + y[f], own.x2 + x[f] * x[f], own.y2 + y[f] * y[f], 0};
+          const double a2 = x[f] * x[f], b2 = y[f] * y[f];
+          next = {next.n + 1, next.move + (y[f] - x[f]), next.squares + (b2 - a2)};
+          own = {own.n + 1, own.x + x[f], own.y + y[f], own.x2 + a2, own.y2 + b2, 0};
         }
         sums[(f + 1) * C + c] = next;
       }

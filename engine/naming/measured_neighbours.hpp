@@ -64,21 +64,24 @@ inline void measure_neighbours(const NeighbourEvidence& in, std::span<const std:
         distance[m] = before;
         variance[m] = movement * movement + (e * e + B * B);
       }
-      const bool is_used = m != markers[i] && std::isfinite(distance[m]) && std::isfinite(variance[m]);
+      const bool is_used =
+          m != markers[i] && std::isfinite(distance[m]) && std::isfinite(variance[m]);
       if (!is_used) distance[m] = 0, variance[m] = kNone;
       cost[m] = is_used ? std::sqrt(variance[m]) + 0.02 * distance[m] : kNone;
     }
     std::iota(order.begin(), order.end(), 0);
-    std::partial_sort(order.begin(), order.begin() + R, order.end(), [&](std::int32_t a, std::int32_t b) {
-      return cost[a] != cost[b] ? cost[a] < cost[b] : a < b;
-    });
+    std::partial_sort(order.begin(), order.begin() + R, order.end(),
+                      [&](std::int32_t a, std::int32_t b) {
+                        return cost[a] != cost[b] ? cost[a] < cost[b] : a < b;
+                      });
     for (std::int32_t r = 0; r < R; ++r) {
       const std::size_t to = i * R + r;
       const double v = variance[order[r]];
       out.neighbour[to] = order[r];
       out.distance[to] = distance[order[r]];
       out.variance[to] = v + kWindowNoise * kWindowNoise;
-      out.weight[to] = kLooseWeight + (1 - kLooseWeight) / (1 + v / (kLooseMovement * kLooseMovement));
+      out.weight[to] =
+          kLooseWeight + (1 - kLooseWeight) / (1 + v / (kLooseMovement * kLooseMovement));
     }
   }
 }

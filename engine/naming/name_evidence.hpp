@@ -95,7 +95,9 @@ class NameEvidence {
     for (std::int32_t m = 0; m < M_; ++m) {
       if (own_quads_[m].empty()) continue;
       // Heights cannot make up for a lower score, so that they are not computed.
-      const auto is_open = [&](std::int32_t k) { return out[static_cast<std::size_t>(k) * M_ + m] >= none_ - kHopeless; };
+      const auto is_open = [&](std::int32_t k) {
+        return out[static_cast<std::size_t>(k) * M_ + m] >= none_ - kHopeless;
+      };
       open_.clear();
       std::ranges::copy_if(rows, std::back_inserter(open_), is_open);
       for (const std::int32_t q : own_quads_[m]) {

@@ -284,9 +284,10 @@ Out<double> with_distances(const In<double>& sums, const nb::dict& marker_of,
   const std::size_t M = sums.shape(1);
   require_frame({points, labels});
   std::vector<double> pose(3 * M, NAN);
-  for (std::size_t i = 0; i < labels.size(); ++i)
-    if (const std::int32_t m = marker_given(marker_of, labels.data()[i], static_cast<std::int32_t>(M)); m >= 0)
-      place_point(points, i, &pose[3 * m]);
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    const auto m = marker_given(marker_of, labels.data()[i], static_cast<std::int32_t>(M));
+    if (m >= 0) place_point(points, i, &pose[3 * m]);
+  }
   Owned<double> out(sums.size());
   std::copy_n(sums.data(), sums.size(), out.data.get());
   add_distances(pose, {out.data.get(), sums.size()});
@@ -355,9 +356,13 @@ void bind_naming(nb::module_& module) {
                     const In<double>&, const In<double>&, const In<double>&>(),
            "frames"_a, "marker_of"_a, nb::kw_only(), "neighbours"_a, "distances"_a, "variances"_a,
            "weights"_a)
-      .def("named", [](const LastTracks& self, std::int64_t turn) { return self.window().turn_of_named(turn); },
+      .def("named",
+           [](const LastTracks& self, std::int64_t turn) {
+             return self.window().turn_of_named(turn);
+           },
            "turn"_a)
-      .def("new", [](const LastTracks& self, std::int64_t turn) { return self.window().turn_of_new(turn); },
+      .def("new",
+           [](const LastTracks& self, std::int64_t turn) { return self.window().turn_of_new(turn); },
            "turn"_a)
       .def("label", &LastTracks::label, "k"_a)
       .def("marker",
