@@ -34,6 +34,7 @@ from naming_takes import (
     Sets,
     Take,
     Trial,
+    back_and_forth,
     clean,
     corrupted,
     read_trials,
@@ -48,6 +49,8 @@ CERTAIN = 0.99
 LABELLING_TEMPLATE = "pyCGM2-FullBody_CGM1_medial.vst"
 EXCHANGED_WRIST = "59993_Frame", ("LWRA", "LWRB")
 """Folder of a subject whose file has two labels exchanged."""
+N_LONG = 1000
+"""Number of frames of a long capture."""
 N_MISSING, N_EXTRA, APART = 4, 3, 0.5  # markers, markers, metres
 
 EVIDENCE = (
@@ -194,6 +197,29 @@ def missing_and_extra(trials: list[Trial], sets: Sets) -> list[list[str]]:
         known = tuple(None if name in extra else name for name in names)
         second.append(measure(target, replace(take, names=known), trial.is_wrong, less))
     return [[f"own static trial, {what}", *cells(r)] for what, r in results.items()]
+
+
+def long_captures(trials: list[Trial], sets: Sets) -> list[list[str]]:
+    """Name captures of many frames: the gait trials, repeated in both directions."""
+    rows: list[list[str]] = []
+    for which in (SETS[0], SETS[3]):
+        for condition in CONDITIONS[:2]:
+            seconds: list[float] = []
+            for trial in trials:
+                own = sets.of(which, trial.subject, trial.kind)
+                whole = back_and_forth(trial.tracks, N_LONG)
+                take = clean(whole) if condition == CONDITIONS[0] else corrupted(whole, 1)
+                begin = time.process_time()
+                am.name_tracks(take.tracks, own)
+                seconds.append(time.process_time() - begin)
+            rows.append(
+                [
+                    f"{which}, {condition}",
+                    str(len(seconds)),
+                    *(f"{f(seconds):.2f}" for f in (np.median, np.max)),
+                ]
+            )
+    return rows
 
 
 def two_subjects(sets: Sets) -> list[list[str]]:
@@ -346,6 +372,11 @@ def main() -> None:
         "detections. Time is of one processor, for naming alone.",
         "",
         *table(("set, condition", *HEAD), by_sets(gait, sets)),
+        "",
+        f"Captures of {N_LONG} frames: the same trials, repeated in both directions. Seconds for "
+        "one capture.",
+        "",
+        *table(("set, condition", "captures", "median", "largest"), long_captures(gait, sets)),
         "",
         EVIDENCE,
         "",

@@ -130,6 +130,18 @@ class Sets:
         return self.others(subject)
 
 
+def back_and_forth(tracks: am.Tracks, n_frames: int) -> am.Tracks:
+    """Repeat a capture, each time in the other direction, up to a number of frames."""
+    d = tracks.detections
+    period = 2 * (d.n_frames - 1)
+    frames = (d.n_frames - 1) - np.abs(np.arange(n_frames) % period - (d.n_frames - 1))
+    labels = [tracks.labels[d.offsets[t] : d.offsets[t + 1]] for t in frames]
+    detections = am.Detections.from_frames(
+        np.arange(n_frames) * d.step, [d.frame(int(t)) for t in frames]
+    )
+    return am.Tracks(detections=detections, labels=np.concatenate(labels), names=tracks.names)
+
+
 def made_of(
     tracks: am.Tracks,
     frames: NDArray[np.int64],

@@ -94,18 +94,18 @@ class PairDensities {
     }
   }
 
-  // Writes the densities of a distance d of spread s for marker a and all markers after it.
+  // Writes the densities of a distance d of spread s for marker a and every other one.
   void densities(std::int32_t a, double d, double s, const FitWeights& known,
                  const FitWeights& unknown, float* out) const {
     const std::size_t row = static_cast<std::size_t>(a) * M_;
     const float squared = static_cast<float>(s * s), distance = static_cast<float>(d);
-    for (std::int32_t b = a + 1; b < M_; ++b) out[b] = 0;
+    for (std::int32_t b = 0; b < M_; ++b) out[b] = 0;
     for (int c = 0; c < kFits; ++c) {
       const float *location = location_[c].data() + row, *variance = variance_[c].data() + row;
       const float* is_known = known_.data() + row;
       const auto with = static_cast<float>(0.375 * known[c]);
       const auto without = static_cast<float>(0.375 * unknown[c]);
-      for (std::int32_t b = a + 1; b < M_; ++b) {
+      for (std::int32_t b = 0; b < M_; ++b) {
         const float v = variance[b] + squared * (is_known[b] > 0 ? 0.25f : 1.0f);
         const float off = distance - location[b], y = 1 + off * off / (4 * v);
         out[b] += (is_known[b] > 0 ? with : without) / (std::sqrt(v * y) * y * y);

@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <span>
 #include <vector>
 
@@ -48,15 +49,22 @@ struct TrackPoses {
 
 class NameEvidence {
  public:
-  NameEvidence(const MarkerTables& markers, std::vector<Quad> quads, TrackPairs pairs,
-               TrackPoses poses, std::vector<double> prior, double size, const FitWeights& weights, double none)
-      : M_(markers.M), K_(pairs.K), size_(size), none_(none), prior_(std::move(prior)), quads_(std::move(quads)),
-        pairs_(std::move(pairs)), poses_(std::move(poses)) {
+  NameEvidence(MarkerTables markers, std::vector<Quad> quads, TrackPairs pairs, TrackPoses poses,
+               std::vector<double> prior, double size, const FitWeights& weights, double none)
+      : M_(markers.M), K_(pairs.K), size_(size), none_(none), prior_(std::move(prior)),
+        markers_(std::move(markers)), quads_(std::move(quads)), pairs_(std::move(pairs)),
+        poses_(std::move(poses)),
+        densities_(M_, markers_.distance, markers_.movement, markers_.variation, size) {
     const std::size_t P = pairs_.first.size();
-    table_.resize(P * M_ * M_);
-    const PairDensities densities(M_, markers.distance, markers.movement, markers.variation, size);
-    for (std::size_t p = 0; p < P; ++p) fill(p, markers, densities, weights);
+    row_of_.assign(P * M_, -1);
+    for (std::size_t p = 0; p < P; ++p) {
+      weights_known_.push_back(weights_at(weights, pairs_.distance[p], true));
+      weights_unknown_.push_back(weights_at(weights, pairs_.distance[p], false));
+    }
     planes_.resize(quads_.size());
+    own_quads_.resize(M_);
+    for (std::size_t q = 0; q < quads_.size(); ++q)
+      own_quads_[quads_[q].marker].push_back(static_cast<std::int32_t>(q));
     own_pairs_.resize(K_);
     for (std::size_t p = 0; p < P; ++p) {
       own_pairs_[pairs_.first[p]].push_back(static_cast<std::int32_t>(p));
@@ -79,18 +87,24 @@ class NameEvidence {
       for (const std::int32_t p : own_pairs_[k]) {
         const std::int32_t other = names[pairs_.first[p] == k ? pairs_.second[p] : pairs_.first[p]];
         if (other < 0) continue;
-        const float* t = table_.data() + (static_cast<std::size_t>(p) * M_ + other) * M_;
-        for (std::int32_t m = 0; m < M_; ++m) row[m] += t[m];  // the table is symmetric
+        const float* t = row_of(p, other);
+        for (std::int32_t m = 0; m < M_; ++m) row[m] += t[m];
       }
     }
     track_of(names);
-    for (std::size_t q = 0; q < quads_.size(); ++q) {
-      if (!find_plane(q)) continue;
-      for (const std::int32_t k : rows) {
-        double& score = out[static_cast<std::size_t>(k) * M_ + quads_[q].marker];
-        // Heights cannot make up for such a score, so that they are not computed.
-        if (score < none_ - kHopeless || std::ranges::count(planes_[q].track, k)) continue;
-        score += height_log_odds(q, k);
+    for (std::int32_t m = 0; m < M_; ++m) {
+      if (own_quads_[m].empty()) continue;
+      // Heights cannot make up for a lower score, so that they are not computed.
+      const auto is_open = [&](std::int32_t k) {
+        return out[static_cast<std::size_t>(k) * M_ + m] >= none_ - kHopeless;
+      };
+      open_.clear();
+      std::ranges::copy_if(rows, std::back_inserter(open_), is_open);
+      for (const std::int32_t q : own_quads_[m]) {
+        if (!find_plane(q)) continue;
+        for (const std::int32_t k : open_)
+          if (is_open(k) && !std::ranges::count(planes_[q].track, k))
+            out[static_cast<std::size_t>(k) * M_ + m] += height_log_odds(q, k);
       }
     }
   }
@@ -99,7 +113,7 @@ class NameEvidence {
     double sum = 0;
     for (std::size_t p = 0; p < pairs_.first.size(); ++p) {
       const std::int32_t a = names[pairs_.first[p]], b = names[pairs_.second[p]];
-      if (a >= 0 && b >= 0) sum += table_[(p * M_ + a) * M_ + b];
+      if (a >= 0 && b >= 0) sum += row_of(p, a)[b];
     }
     for (std::int32_t k = 0; k < K_; ++k)
       if (names[k] >= 0) sum += prior_[static_cast<std::size_t>(k) * M_ + names[k]] - none_;
@@ -120,24 +134,29 @@ class NameEvidence {
     std::vector<double> log_odds;  // of the height of each track, NaN if not computed
   };
 
-  void fill(std::size_t p, const MarkerTables& markers, const PairDensities& densities,
-            const FitWeights& weights) {
+  // Log odds of the distance of a pair if one of its tracks has marker a, for all markers of the
+  // other. They are computed when they are first needed: a search meets few of them.
+  const float* row_of(std::size_t p, std::int32_t a) const {
+    std::int32_t& row = row_of_[p * M_ + a];
+    if (row < 0) row = computed(p, a);
+    return table_.data() + static_cast<std::size_t>(row) * M_;
+  }
+
+  std::int32_t computed(std::size_t p, std::int32_t a) const {
+    const std::size_t begin = table_.size();
+    table_.resize(begin + M_);
+    float* row = table_.data() + begin;
     const double d = pairs_.distance[p], s = pairs_.spread[p];
-    const FitWeights known = weights_at(weights, d, true), unknown = weights_at(weights, d, false);
-    float* t = table_.data() + p * M_ * M_;
-    for (std::int32_t a = 0; a < M_; ++a) {
-      float* row = t + static_cast<std::size_t>(a) * M_;
-      densities.densities(a, d, s, known, unknown, row);
-      row[a] = static_cast<float>(kMinOdds);
-      for (std::int32_t b = 0; b < a; ++b) row[b] = t[static_cast<std::size_t>(b) * M_ + a];
-      for (std::int32_t b = a + 1; b < M_; ++b) {
-        const std::size_t at = static_cast<std::size_t>(a) * M_ + b;
-        const double B = markers.variation[at];
-        row[b] = std::isnan(markers.distance[at])
-                     ? 0
-                     : static_cast<float>(loose_weight(s * s + B * B)) * bounded_log_odds(row[b]);
-      }
+    densities_.densities(a, d, s, weights_known_[p], weights_unknown_[p], row);
+    for (std::int32_t b = 0; b < M_; ++b) {
+      const std::size_t at = static_cast<std::size_t>(a) * M_ + b;
+      const double B = markers_.variation[at];
+      row[b] = std::isnan(markers_.distance[at])
+                   ? 0
+                   : static_cast<float>(loose_weight(s * s + B * B)) * bounded_log_odds(row[b]);
     }
+    row[a] = static_cast<float>(kMinOdds);
+    return static_cast<std::int32_t>(begin / M_);
   }
 
   void track_of(const Names& names) const {
@@ -218,11 +237,17 @@ class NameEvidence {
   std::int32_t M_, K_;
   double size_, none_;
   std::vector<double> prior_;  // (K, M)
+  MarkerTables markers_;
   std::vector<Quad> quads_;
   TrackPairs pairs_;
   TrackPoses poses_;
-  std::vector<float> table_;                          // (P, M, M)
+  PairDensities densities_;
+  std::vector<FitWeights> weights_known_, weights_unknown_;  // (P,)
+  mutable std::vector<std::int32_t> row_of_;          // (P, M), row of the table, -1 for none yet
+  mutable std::vector<float> table_;                  // (rows, M)
   std::vector<std::vector<std::int32_t>> own_pairs_;  // of each track
+  std::vector<std::vector<std::int32_t>> own_quads_;  // of each marker
+  mutable std::vector<std::int32_t> open_;            // tracks whose heights are wanted
   mutable std::vector<std::int32_t> track_;           // of each marker, -1 for none
   mutable std::vector<Plane> planes_;                 // of each quad, as last found
 };

@@ -171,7 +171,7 @@ class NameSearch {
       for (std::int32_t m = 0; m < evidence_.n_markers(); ++m)
         if (const double gain = at(k, m) - least; gain > 0 && !is_taken[m])
           candidates_.push_back({k, m, gain, 0});
-    assignment_.solve_groups(candidates_, evidence_.n_markers(), out);
+    assignment_.solve(candidates_, out);
     return out;
   }
 

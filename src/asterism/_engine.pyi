@@ -638,8 +638,52 @@ def window_scores(
     weights: Floats,
 ) -> Floats: ...
 
-# Positions of tracks in frames of (points, labels): (frames, tracks, 3), NaN without a detection.
-def positions_of_labels(tracks: Ints, frames: Sequence[tuple[Floats, Ints]]) -> Floats: ...
+# Median distances between K tracks, their spreads, and their numbers of frames, each (K, K).
+def distances_between(positions: Floats) -> tuple[Floats, Floats, Ints]: ...
+
+# Exchanges of two tracks: (track, other track, first frame, frame after the last).
+def exchanges_by_distances(
+    positions: Floats, *, min_frames: int
+) -> list[tuple[int, int, int, int]]: ...
+
+# Number, sum and sum of squares of distances between markers, with those of one more frame.
+def with_distances(
+    sums: Floats, marker_of: dict[int, int], points: Floats, labels: Ints
+) -> Floats: ...
+
+# Neighbours of markers, their distances, variances and weights, each (n, R).
+def measured_neighbours(
+    markers: Ints,
+    *,
+    size: float,
+    is_kept: bool,
+    distances: Floats,
+    movements: Floats,
+    variations: Floats,
+    middle: Floats,
+    spread: Floats,
+    n_frames: Floats,
+) -> tuple[Ints, Floats, Floats, Floats]: ...
+
+# Tracks of the last of some frames of (points, labels), numbered by label from 0 on.
+class LastTracks:
+    def __init__(
+        self,
+        frames: Sequence[tuple[Floats, Ints]],
+        marker_of: dict[int, int],
+        *,
+        neighbours: Ints,
+        distances: Floats,
+        variances: Floats,
+        weights: Floats,
+    ) -> None: ...
+    def named(self, turn: int) -> int: ...
+    def new(self, turn: int) -> int: ...
+    def label(self, k: int) -> int: ...
+    def marker(self, k: int) -> int: ...
+    def holder(self, m: int) -> int: ...
+    def best_free(self, k: int, *, none: float, temperature: float) -> tuple[int, float, float]: ...
+    def better(self, k: int, *, none: float) -> tuple[int, float]: ...
 
 class StartOptions:
     def __init__(

@@ -224,7 +224,7 @@ class Named(Method[NamedState]):
         if after.live is not None and _has_lost_all(after):
             after = replace(after, live=None, names={}, probabilities={})
         if after.live is not None:
-            after = self._followed(after)
+            after = _followed(after, after.live)
         elif time >= state.next_search:
             after = self._searched(after)
         names = tuple(map(after.names.get, update.labels.tolist()))
@@ -258,20 +258,23 @@ class Named(Method[NamedState]):
             state, live=live, names=names, probabilities={k: p for k, (_, p) in named.items()}
         )
 
-    def _followed(self, state: NamedState) -> NamedState:
-        """Examine tracks in the last frames."""
-        assert state.live is not None
-        recent = [(f.points, f.labels) for f in state.recent[-state.live.LENGTH :]]
-        live, changed = state.live.followed(recent)
-        if not changed:
-            return replace(state, live=live)
-        names, probabilities = dict(state.names), dict(state.probabilities)
+
+def _followed(state: NamedState, live: LiveNames) -> NamedState:
+    """Examine tracks in the last frames."""
+    recent = [(f.points, f.labels) for f in state.recent[-live.LENGTH :]]
+    live, changed = live.followed(recent)
+    names, probabilities = state.names, state.probabilities
+    if changed:
+        names, probabilities = dict(names), dict(probabilities)
         for label, found in changed.items():
             names.pop(label, None)
             probabilities.pop(label, None)
             if found is not None:
                 names[label], probabilities[label] = found
-        return replace(state, live=live, names=names, probabilities=probabilities)
+    return NamedState(
+        tracks=state.tracks, names=names, probabilities=probabilities, recent=state.recent,
+        live=live, next_search=state.next_search, wait=state.wait,
+    )  # fmt: skip
 
 
 def _has_lost_all(state: NamedState) -> bool:

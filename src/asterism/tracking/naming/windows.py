@@ -273,9 +273,8 @@ def _assigned(
     _, columns = linear_sum_assignment(np.concatenate([-scores[core], alone], axis=1))
     names[core] = np.where(columns < M, columns, -1)
     taken = np.zeros((len(is_seen), M), dtype=bool)
-    for k in core:
-        if names[k] >= 0:
-            taken[:, names[k]] |= is_seen[:, k]
+    named = core[names[core] >= 0]
+    taken[:, names[named]] = is_seen[:, named]
     rest = np.flatnonzero(~is_seen[frame])
     for k in rest[np.argsort(-scores[rest].max(axis=1), kind="stable")]:
         if scores[k].max() <= MIN_LOG_ODDS:

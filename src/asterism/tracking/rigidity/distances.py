@@ -98,13 +98,5 @@ def distances_between(positions: NDArray[np.float64]) -> Distances:
     Distances
         Of shape (K, K).
     """
-    F, K, _ = positions.shape
-    if F == 0 or K == 0:
-        none = np.full((K, K), np.nan)
-        return Distances(middle=none, spread=none, n_frames=np.zeros((K, K), dtype=np.int64))
-    rows = [distances_from(positions[:, k], positions) for k in range(K)]
-    return Distances(
-        middle=np.stack([row.middle for row in rows]),
-        spread=np.stack([row.spread for row in rows]),
-        n_frames=np.stack([row.n_frames for row in rows]),
-    )
+    middle, spread, n_frames = _engine.distances_between(np.ascontiguousarray(positions))
+    return Distances(middle=middle, spread=spread, n_frames=n_frames)
