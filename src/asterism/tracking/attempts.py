@@ -44,6 +44,8 @@ PRESENT = 0.3
 MARKERS = range(4, 201)
 """Number of markers of such a set. With fewer, distances are ambiguous; the time of naming grows
 with the square of the number."""
+MAX_CELLS = 30_000_000
+"""Largest product of frames and tracks for such a set; positions of so many take 0.7 GB."""
 
 
 @record(eq=False)
@@ -188,7 +190,8 @@ def refined_by_own_distances(found: Uncorrected, n_right: float) -> Uncorrected:
     """
     tracks = found.tracks
     is_present = tracks.lengths >= PRESENT * tracks.detections.n_frames
-    if int(is_present.sum()) not in MARKERS:
+    n_cells = tracks.detections.n_frames * tracks.n_tracks
+    if int(is_present.sum()) not in MARKERS or n_cells > MAX_CELLS:
         return found
     names = tuple(f"M{k}" if own else None for k, own in enumerate(is_present))
     named, best = dataclasses.replace(tracks, names=names), found
