@@ -5,7 +5,8 @@ seed markers wobble and slip; corrupted in five ways. Each part of a track betwe
 is right if most of its detections are of the marker that holds most of the track; each exchange is
 right if the later part of one track belongs to the other. The logistic functions of
 ``tracking/confidence/calibration.py`` are fitted by maximum likelihood. The check is of the
-captures of ``../shared/data`` (or ``--data``) in four conditions.
+captures of ``../shared/data`` (or ``--data``) in four conditions, without the detections with a
+wrong label in the file (`wrong.py`).
 
     python benchmarks/calibration.py [--seeds N] [--data FOLDER] [--markdown FILE]
 """
@@ -29,6 +30,7 @@ from asterism.tracking.methods.associate import associate
 from captures import captures
 from identity import CONDITIONS
 from report import conditions, publish, table
+from wrong import is_wrong, wrong_runs
 
 Array = NDArray[np.float64]
 Corrupt = Callable[[am.Tracks, int], am.Tracks]
@@ -97,15 +99,6 @@ def tracked(
     return stitching.tracks, model, stitching
 
 
-def is_wrong(tracks: am.Tracks, truth: am.Tracks) -> NDArray[np.bool_]:
-    """Return for each detection whether it is not of the marker that holds most of its track."""
-    inside = (tracks.labels >= 0) & (truth.labels >= 0)
-    counts = np.zeros((tracks.n_tracks, truth.n_tracks), dtype=np.int64)
-    np.add.at(counts, (tracks.labels[inside], truth.labels[inside]), 1)
-    most = np.where(counts.any(axis=1), counts.argmax(axis=1), -2)
-    return (tracks.labels >= 0) & (truth.labels != most[tracks.labels])
-
-
 def parts_of(found: Examined, tracks: am.Tracks, truth: am.Tracks) -> tuple[Array, Array]:
     """Return features of the parts that are not whole tracks, and whether each is right."""
     parts, evidence = found.parts, found.evidence
@@ -153,9 +146,11 @@ class Reliability:
         self.parts: list[tuple[Array, NDArray[np.bool_]]] = []
 
     def add(self, tracks: am.Tracks, truth: am.Tracks) -> None:
-        """Count the detections of one result."""
+        """Count the detections of one result, those with a wrong label in the file left out."""
         assert tracks.identity_confidence is not None
         inside = tracks.labels >= 0
+        for run in wrong_runs(tracks, truth):
+            inside[run.detections] &= run.kind != "label error"
         self.parts.append((tracks.identity_confidence[inside], ~is_wrong(tracks, truth)[inside]))
 
     def row(self, name: str) -> list[str]:
