@@ -2,9 +2,10 @@
 
 Where a track and the labels of a file differ, one of both is wrong. A run of detections that a
 track holds under another label is an error of the file in three cases. All markers concerned are
-within millimetres of each other, so that nothing shows which is which. Or the motion is continuous
-at the ends of the run from one frame to the next, where the labels of the file jump. Or the
-distances to the other labels are those of the marker of the track, not those of the label.
+within millimetres of each other, so that nothing shows which is which. Or the motion of the track
+is continuous at the ends of the run from one frame to the next, where the labels of the file jump;
+at deviations of centimetres the distances must favour the track too. Or the distances to the other
+labels are clearly those of the marker of the track, not those of the label.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ Indices = NDArray[np.int64]
 NEXT = 2
 """Largest number of frames from one detection to the next at which motion is compared."""
 CONTINUOUS = 0.005
-"""Largest deviation from straight motion, metres, if the file has no other detection there."""
+"""Deviation from straight motion, metres, within which motion is continuous."""
 RELATIVE, JUMP = 0.35, 0.01
 """Largest deviation relative to that of the labels of the file, and the smallest one of these,
 metres."""
@@ -115,17 +116,20 @@ class Labels:
             Label of most detections of the track.
         """
         run = own[begin:end]
-        return (
-            self._is_same_place(run, marker)
-            or self._is_continuous(own, begin, end, marker)
-            or self._has_distances_of(run, marker)
+        if self._is_same_place(run, marker) or self._is_continuous(
+            own, begin, end, marker, CONTINUOUS
+        ):
+            return True
+        ratio = self._least_ratio(run, marker)
+        return ratio > MIN_RATIO or (
+            ratio > 0 and self._is_continuous(own, begin, end, marker, np.inf)
         )
 
     def _is_same_place(self, run: Indices, marker: int) -> bool:
         apart = self.points[run] - self.dense[self.frame[run], marker]
         return bool((np.linalg.norm(apart, axis=1) < SAME_PLACE).all())
 
-    def _is_continuous(self, own: Indices, begin: int, end: int, marker: int) -> bool:
+    def _is_continuous(self, own: Indices, begin: int, end: int, marker: int, most: float) -> bool:
         votes: list[bool] = []
         for at, way in ((begin, 1), (end - 1, -1)):
             if not 0 <= at - way < len(own):
@@ -145,10 +149,8 @@ class Labels:
                 for link in (self.points[inside] - self.points[outside], goes_on, comes_from)
                 if not np.isnan(link).any()
             )
-            if jumps:
-                votes.append(min(jumps) > JUMP and kept < RELATIVE * min(jumps))
-            else:
-                votes.append(kept < CONTINUOUS)
+            jump = min(jumps, default=CONTINUOUS / RELATIVE)
+            votes.append(jump > JUMP and kept < min(RELATIVE * jump, most))
         return bool(votes) and all(votes)
 
     def _velocity(self, own: Indices, at: int, to: int, way: int) -> Array:
@@ -162,10 +164,10 @@ class Labels:
             return np.zeros(self.points.shape[1])
         return way * to * (self.points[own[at + to]] - self.points[own[at]]) / n
 
-    def _has_distances_of(self, run: Indices, marker: int) -> bool:
-        """Return whether the distances of all labels of a run are those of another marker."""
-        return all(
-            self._ratio(self.frame[run[self.labels[run] == label]], int(label), marker) > MIN_RATIO
+    def _least_ratio(self, run: Indices, marker: int) -> float:
+        """Return the smallest ratio of the labels of a run."""
+        return min(
+            self._ratio(self.frame[run[self.labels[run] == label]], int(label), marker)
             for label in np.unique(self.labels[run])
         )
 
