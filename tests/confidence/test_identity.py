@@ -81,6 +81,35 @@ def test_a_track_on_another_marker_is_uncertain_there_alone():
     assert is_sound(found)
 
 
+def test_a_link_that_leaps_to_an_unknown_marker_is_uncertain():
+    n_frames, lost, found_again = 230, 200, 204
+    rng = np.random.default_rng(1)
+    shape = rng.uniform(-0.3, 0.3, (9, 3))
+    shape[8] = shape[0] + [0.09, 0, 0]
+    t, positions = moving(shape, n_frames, seed=3, noise=3e-4)
+    positions[found_again:, 0] = positions[found_again:, 8]  # which no other track holds
+    positions[lost:found_again, 0] = np.nan
+    tracks = am.Tracks.from_dense(t, positions[:, :8])
+    found = assess(tracks, am.estimate_model(tracks.detections).model)
+    frame, sure = tracks.detections.frame_of, found.identity_confidence
+    inside = (tracks.labels == 0) & (frame >= found_again)
+    assert sure[inside].max() < 0.8
+    assert sure[~inside].min() > 0.9
+    (listed,) = (each for each in found.decisions if each.probability < 0.8)
+    assert (listed.track, listed.first, listed.last) == (0, found_again, n_frames - 1)
+    assert listed.alternatives[0].track is None
+
+
+def test_a_gap_of_straight_motion_is_no_leap():
+    shape = np.random.default_rng(1).uniform(-0.3, 0.3, (8, 3))
+    t, positions = moving(shape, 300, seed=3, noise=3e-4)
+    for k in range(8):
+        positions[30 * k + 20 : 30 * k + 24, k] = np.nan
+    tracks = am.Tracks.from_dense(t, positions)
+    found = assess(tracks, am.estimate_model(tracks.detections).model)
+    assert found.decisions == ()
+
+
 def test_a_perfect_capture_has_no_decision():
     for truth in (am.simulate.cube(frames=100, seed=1), exchanged(n_missed=0, first=0, last=300)):
         tracks = am.track(truth.detections)

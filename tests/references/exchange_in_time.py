@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 
 BEGIN, FARTHEST, MIN_RATIO = -6.0, 12.0, -4.0
-EXCHANGE = (-1.24, 0.26, 0.67)
+EXCHANGE = (-1.54, 0.21, 0.76)
 
 
 def best_intervals(lanes, is_short, log_likelihood, ratio_of):

@@ -21,9 +21,9 @@ __all__ = [
     "part_probability",
 ]
 
-EXCHANGE = (-1.24, 0.26, 0.67)
+EXCHANGE = (-1.54, 0.21, 0.76)
 """Log odds of an exchange: constant, factor of its log-likelihood ratio, and of both links."""
-PART = (-1.36, 0.90, 0.62, 0.16, 0.18)
+PART = (-1.46, 0.93, 0.64, 0.31, 0.28)
 """Log odds that a part is on the marker of its track: constant, and the factors of the margins of
 its distances over an unknown marker and over the best other track, of the log odds of the less
 certain link or join at its ends, and of the logarithm of its number of detections."""

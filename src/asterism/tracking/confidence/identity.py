@@ -34,6 +34,11 @@ MIN_ALTERNATIVE = 1e-3
 """Smallest probability of an alternative that is listed."""
 OTHER_JOIN = 0.95
 """Probability of a join of tracklets that stitching did not make, as by names."""
+LEAP, RELATIVE, LEAP_FRAMES = 0.04, 0.5, 3
+"""Deviation from straight motion, metres and relative to the length of the link, and frames from
+one detection to the next, from which on a link is uncertain by its motion alone."""
+LEAPING = 0.84
+"""Probability of such a link, as measured on simulated people."""
 
 
 def assess(
@@ -148,6 +153,8 @@ def examine(
     if tracks.confidence is not None:
         own = np.flatnonzero((tracks.confidence <= CERTAIN) & (tracks.labels >= 0))
         cuts.append((own, tracks.confidence[own]))
+    leaps = _leaps(tracks)
+    cuts.append((leaps, np.full(len(leaps), LEAPING)))
     if stitching is not None:
         cuts.append(_joins(tracks, stitching))
     parts = part_tracks(
@@ -192,6 +199,25 @@ def _after_exchanges(
     linked = np.zeros(len(detections), dtype=bool)
     linked[index[is_link]] = True
     return detections[linked], link[linked], partner[linked]
+
+
+def _leaps(tracks: Tracks) -> NDArray[np.int64]:
+    """Return the first detection after each link over missed frames that is far from straight."""
+    order, _ = tracks.by_track
+    d = tracks.detections
+    frame, label = d.frame_of[order].astype(np.int64), tracks.labels[order]
+    n = np.diff(frame)
+    links = np.flatnonzero((np.diff(label) == 0) & (n >= LEAP_FRAMES))
+    step = d.points[order[links + 1]] - d.points[order[links]]
+    off2 = np.zeros(len(links))
+    for side in (-1, 1):  # the velocity before, and that after the link
+        at = np.clip(links + side, 0, len(n) - 1)
+        has = (label[at] == label[at + 1]) & (label[at] == label[links]) & (at != links)
+        other = d.points[order[at + 1]] - d.points[order[at]]
+        off = step - other * (n[links] / np.maximum(n[at], 1))[:, None]
+        off2 = np.maximum(off2, np.where(has, (off**2).sum(axis=1), 0))
+    least2 = np.maximum(LEAP**2, (RELATIVE * step) ** 2 @ np.ones(d.n_axes))
+    return order[links[off2 > least2] + 1]
 
 
 def _joins(tracks: Tracks, stitching: Stitching) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

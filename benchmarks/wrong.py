@@ -1,0 +1,213 @@
+"""Wrong detections of tracks, by the labels of a file and where these are wrong themselves.
+
+Where a track and the labels of a file differ, one of both is wrong. A run of detections that a
+track holds under another label is an error of the file in three cases. All markers concerned are
+within millimetres of each other, so that nothing shows which is which. Or the motion of the track
+is continuous at the ends of the run from one frame to the next, where the labels of the file jump;
+at deviations of centimetres the distances must favour the track too. Or the distances to the other
+labels are clearly those of the marker of the track, not those of the label.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    import asterism as am
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+NEXT = 2
+"""Largest number of frames from one detection to the next at which motion is compared."""
+CONTINUOUS = 0.005
+"""Deviation from straight motion, metres, within which motion is continuous."""
+RELATIVE, JUMP = 0.35, 0.01
+"""Largest deviation relative to that of the labels of the file, and the smallest one of these,
+metres."""
+SAME_PLACE = 0.003
+"""Distance of two detections, metres, within which nothing shows which of them is which marker."""
+MIN_REFERENCES, MAX_REFERENCES = 4, 8
+MIN_FRAMES = 8
+"""Smallest number of frames of a distance."""
+MIN_CONTRAST = 2.0
+"""Smallest difference of the distances of two markers to a third, in deviations."""
+MIN_RATIO = 1.0
+"""Log density ratio of a distance, in the mean, from which on the label is wrong."""
+
+
+class Run(NamedTuple):
+    """Run of wrong detections of a track."""
+
+    track: int
+    first: int
+    last: int
+    kind: Literal["switch", "clutter", "label error"]
+    detections: Indices
+
+
+def is_wrong(tracks: am.Tracks, truth: am.Tracks) -> NDArray[np.bool_]:
+    """Return for each detection whether it is not of the marker that holds most of its track."""
+    inside = (tracks.labels >= 0) & (truth.labels >= 0)
+    counts = np.zeros((tracks.n_tracks, truth.n_tracks), dtype=np.int64)
+    np.add.at(counts, (tracks.labels[inside], truth.labels[inside]), 1)
+    most = np.where(counts.any(axis=1), counts.argmax(axis=1), -2)
+    return (tracks.labels >= 0) & (truth.labels != most[tracks.labels])
+
+
+def wrong_runs(tracks: am.Tracks, truth: am.Tracks) -> list[Run]:
+    """Return the runs of wrong detections of all tracks."""
+    order, offsets = tracks.by_track
+    wrong, named = is_wrong(tracks, truth), truth.labels >= 0
+    frame = tracks.detections.frame_of
+    labels = Labels(truth)
+    found: list[Run] = []
+    for k in range(tracks.n_tracks):
+        own = order[offsets[k] : offsets[k + 1]]
+        inside = own[named[own]]
+        for begin, end in _runs(wrong[inside]):
+            marker = int(np.bincount(truth.labels[inside]).argmax())
+            error = labels.is_error(inside, begin, end, marker)
+            run = inside[begin:end]
+            kind = "label error" if error else "switch"
+            found.append(Run(k, int(frame[run[0]]), int(frame[run[-1]]), kind, run))
+        for begin, end in _runs(~named[own]):
+            run = own[begin:end]
+            found.append(Run(k, int(frame[run[0]]), int(frame[run[-1]]), "clutter", run))
+    return found
+
+
+def _runs(values: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], values.astype(int), [0]])))
+    yield from ((int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True))
+
+
+class Labels:
+    """Labels of a file, by which runs of detections are judged.
+
+    Parameters
+    ----------
+    truth : Tracks
+        Tracks by the labels of the file.
+    """
+
+    def __init__(self, truth: am.Tracks) -> None:
+        d = truth.detections
+        self.labels, self.frame, self.points = truth.labels, d.frame_of, d.points
+        self.dense = np.full((d.n_frames, truth.n_tracks, d.n_axes), np.nan)
+        named = truth.labels >= 0
+        self.dense[self.frame[named], truth.labels[named]] = d.points[named]
+
+    def is_error(self, own: Indices, begin: int, end: int, marker: int) -> bool:
+        """Return whether the labels of a run of detections are wrong.
+
+        Parameters
+        ----------
+        own : ndarray of int
+            Detections of a track, in order of time.
+        begin, end : int
+            The run, ``own[begin:end]``.
+        marker : int
+            Label of most detections of the track.
+        """
+        run = own[begin:end]
+        if self._is_same_place(run, marker) or self._is_continuous(
+            own, begin, end, marker, CONTINUOUS
+        ):
+            return True
+        ratio = self._least_ratio(run, marker)
+        return ratio > MIN_RATIO or (
+            ratio > 0 and self._is_continuous(own, begin, end, marker, np.inf)
+        )
+
+    def _is_same_place(self, run: Indices, marker: int) -> bool:
+        apart = self.points[run] - self.dense[self.frame[run], marker]
+        return bool((np.linalg.norm(apart, axis=1) < SAME_PLACE).all())
+
+    def _is_continuous(self, own: Indices, begin: int, end: int, marker: int, most: float) -> bool:
+        votes: list[bool] = []
+        for at, way in ((begin, 1), (end - 1, -1)):
+            if not 0 <= at - way < len(own):
+                continue
+            inside, outside = own[at], own[at - way]
+            if abs(self.frame[inside] - self.frame[outside]) > NEXT:
+                continue
+            label = self.labels[inside]
+            n = abs(int(self.frame[inside]) - int(self.frame[outside]))
+            velocities = self._velocity(own, at - way, -way, way), self._velocity(own, at, way, way)
+            # The same link by the labels of the file: where the marker of the track goes on, and
+            # where that of the run comes from.
+            goes_on = self.dense[self.frame[inside], marker] - self.points[outside]
+            comes_from = self.points[inside] - self.dense[self.frame[outside], label]
+            kept, *jumps = (
+                min(_length(link - n * v) for v in velocities)
+                for link in (self.points[inside] - self.points[outside], goes_on, comes_from)
+                if not np.isnan(link).any()
+            )
+            jump = min(jumps, default=CONTINUOUS / RELATIVE)
+            votes.append(jump > JUMP and kept < min(RELATIVE * jump, most))
+        return bool(votes) and all(votes)
+
+    def _velocity(self, own: Indices, at: int, to: int, way: int) -> Array:
+        """Return the motion of a track a frame, in a direction of time, from one to the next."""
+        n = (
+            abs(int(self.frame[own[at + to]]) - int(self.frame[own[at]]))
+            if (0 <= at + to < len(own))
+            else NEXT + 1
+        )
+        if n > NEXT:
+            return np.zeros(self.points.shape[1])
+        return way * to * (self.points[own[at + to]] - self.points[own[at]]) / n
+
+    def _least_ratio(self, run: Indices, marker: int) -> float:
+        """Return the smallest ratio of the labels of a run."""
+        return min(
+            self._ratio(self.frame[run[self.labels[run] == label]], int(label), marker)
+            for label in np.unique(self.labels[run])
+        )
+
+    def _ratio(self, frames: Indices, label: int, marker: int) -> float:
+        """Return the mean log density ratio of the distances of a label being those of a marker."""
+        others = np.setdiff1d(np.arange(self.dense.shape[1]), (label, marker))
+        outside = np.setdiff1d(np.arange(len(self.dense)), frames)
+        of_label, of_marker = (self._distances(each, outside, others) for each in (label, marker))
+        found = _median(self._all_distances(label, frames, others))
+        contrast = np.abs(of_label[0] - of_marker[0]) / np.hypot(of_label[1], of_marker[1])
+        used = np.flatnonzero((contrast > MIN_CONTRAST) & ~np.isnan(found))
+        if len(used) < MIN_REFERENCES:
+            return 0.0
+        used = used[np.argsort(-contrast[used])][:MAX_REFERENCES]
+        a, b = (
+            -2 * np.log1p(((found - m)[used] / s[used]) ** 2 / 3) - np.log(s[used])
+            for m, s in (of_marker, of_label)
+        )
+        return float(np.mean(a - b))
+
+    def _all_distances(self, label: int, frames: Indices, others: Indices) -> Array:
+        at = self.dense[frames]
+        return np.linalg.norm(at[:, others] - at[:, [label]], axis=-1)
+
+    def _distances(self, label: int, frames: Indices, others: Indices) -> tuple[Array, Array]:
+        """Return median and spread of the distances of a label to others, NaN for unknown ones."""
+        d = self._all_distances(label, frames, others)
+        d[:, (~np.isnan(d)).sum(axis=0) < MIN_FRAMES] = np.nan
+        median = _median(d)
+        deviation = 1.4826 * _median(np.abs(d - median))
+        return median, np.maximum(deviation, SAME_PLACE + 0.02 * median)
+
+
+def _length(v: Array) -> float:
+    return float(np.linalg.norm(v))
+
+
+def _median(d: Array) -> Array:
+    """Return the median of each column without its NaN, NaN for a column of NaN."""
+    found = np.full(d.shape[1], np.nan)
+    known = ~np.isnan(d).all(axis=0)
+    found[known] = np.nanmedian(d[:, known], axis=0)
+    return found

@@ -1,0 +1,71 @@
+"""Wrong detections of tracks, and labels of a file that are wrong themselves."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import asterism as am
+from tests.paths import ROOT
+
+sys.path.append(str(ROOT / "benchmarks"))
+
+from wrong import wrong_runs
+
+FIRST, LAST = 100, 139
+PAIR = 3, 12
+
+
+def exchanged(truth: am.Tracks) -> am.Tracks:
+    """Exchange the labels of two markers in some frames."""
+    frame, labels = truth.detections.frame_of, truth.labels.copy()
+    inside = (frame >= FIRST) & (frame <= LAST)
+    for one, other in (PAIR, PAIR[::-1]):
+        labels[inside & (truth.labels == one)] = other
+    return replace(truth, labels=labels)
+
+
+@pytest.mark.parametrize("corrupted", [False, True])
+def test_exchanged_tracks_are_switches_and_exchanged_labels_are_errors(corrupted):
+    truth = am.simulate.person(frames=300, n_markers=40, seed=2)
+    if corrupted:
+        truth = am.simulate.corrupt(truth, missing=0.05, noise=3e-4, seed=2)
+    wrong = exchanged(truth)
+    for tracks, labels, kind in ((wrong, truth, "switch"), (truth, wrong, "label error")):
+        runs = wrong_runs(tracks, labels)
+        assert {run.track for run in runs} == set(PAIR)
+        assert {run.kind for run in runs} == {kind}
+        assert min(run.first for run in runs) == FIRST
+        assert max(run.last for run in runs) == LAST
+
+
+def test_a_label_that_changes_in_a_gap_is_an_error_by_its_distances():
+    made = am.simulate.person(frames=300, n_markers=40, seed=2)
+    positions = made.positions()
+    for at in (FIRST, LAST):
+        positions[at - 6 : at + 7, PAIR] = np.nan
+    truth = am.Tracks.from_dense(made.detections.times, positions)
+    wrong = exchanged(truth)
+    assert {run.kind for run in wrong_runs(wrong, truth)} == {"switch"}
+    assert {run.kind for run in wrong_runs(truth, wrong)} == {"label error"}
+
+
+def test_two_markers_in_one_place_are_no_switch():
+    truth = am.simulate.person(frames=300, n_markers=40, seed=2)
+    positions = truth.positions()
+    one, other = PAIR
+    positions[FIRST : LAST + 1, other] = positions[FIRST : LAST + 1, one] + 1e-3
+    truth = am.Tracks.from_dense(truth.detections.times, positions)
+    assert {run.kind for run in wrong_runs(exchanged(truth), truth)} == {"label error"}
+
+
+def test_no_label_of_simulated_people_is_found_wrong():
+    made = am.simulate.person(activity="run", frames=300, seed=31)
+    truth = am.simulate.corrupt(made, missing=0.1, clutter=0.1, noise=3e-4, stride=3, seed=31)
+    runs = wrong_runs(am.track(truth.detections), truth)
+    kinds = [run.kind for run in runs]
+    assert kinds.count("switch") > 20
+    assert "label error" not in kinds
