@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import itertools
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +27,7 @@ import asterism as am
 from asterism.simulate import Burst, Ghosts
 from asterism.tracking.confidence import calibration
 from asterism.tracking.confidence.identity import Examined, examine
-from asterism.tracking.methods.associate import associate
+from asterism.tracking.pipeline import without_edits
 from captures import captures
 from identity import CONDITIONS
 from report import conditions, publish, table
@@ -93,17 +94,13 @@ CORRUPTED: dict[str, Corrupt] = {
 
 
 def tracked(
-    truth: am.Tracks,
+    truth: am.Tracks, *, retry: bool = True
 ) -> tuple[am.Tracks, am.TrackingModel, am.tracking.Stitching | None]:
-    """Track by the default path, up to the confidence."""
-    plan = am.tracking.plan_tracking(truth.detections)
-    model = plan.recipe.model
-    model = am.tracking.tracklet_model(model) if plan.recipe.stitch else model
-    tracks = associate(plan.method, truth.detections, model, score=False)
-    if not plan.recipe.stitch:
-        return tracks, model, None
-    stitching = am.stitch(tracks, model)
-    return stitching.tracks, model, stitching
+    """Track by the default path, up to the confidence; `retry` is that of the recipe."""
+    recipe = am.tracking.plan_tracking(truth.detections).recipe
+    recipe = replace(recipe, retry=recipe.retry and retry)
+    begun = without_edits(recipe, truth.detections)
+    return begun.tracks, begun.model, begun.stitching
 
 
 def parts_of(found: Examined, tracks: am.Tracks, truth: am.Tracks) -> tuple[Array, Array]:
@@ -196,7 +193,8 @@ def main() -> None:
     exchanges: list[tuple[Array, Array]] = []
     reliability: dict[str, Reliability] = {}
     for name, truth in simulated(options.seeds):
-        tracks, model, stitching = tracked(truth)
+        # Further attempts are chosen by the confidence that is fitted here.
+        tracks, model, stitching = tracked(truth, retry=False)
         found = examine(tracks, model, stitching)
         parts.append(parts_of(found, tracks, truth))
         exchanges.append(exchanges_of(found, truth))
