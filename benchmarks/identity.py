@@ -4,7 +4,7 @@ As captured; 10 % missing, 10 % clutter, 0.3 mm of noise; bursts (up to 5 marker
 for 5 to 60 frames, up to 3 ghosts within 5 cm of a marker for 1 to 10 frames, 0.3 mm of noise); the
 second at half the rate. The identity of a marker counts across its gaps: the oracles are the truth,
 broken at every gap of more than 10, and of more than 60 frames. “By default” is `track` without a
-method.
+method; with `--methods` and no name, it is all that is measured.
 
     python benchmarks/identity.py [--data FOLDER] [--only NAME] [--methods NAME …] [--markdown FILE]
 """
@@ -176,13 +176,14 @@ def page(
     """Give the lines of the page."""
     lines = ["Means over the captures, IDF1 (switches for 1000 detections), alone → stitched:", ""]
     lines += [*table(["", *CONDITIONS], means), ""]
-    lines += [
-        "Ghosts and clutter that are labelled, %, and processor time of stitching a frame, ms:"
-    ]
-    head = [*list(CONDITIONS)[1:], *(f"ms, {c}" for c in CONDITIONS)]
-    lines += ["", *table(["", *head], rest), ""]
-    lines += ["Joins of all methods in bursts, by how probable they were held:", ""]
-    lines += [*table(["held for", "joins", "mean, %", "right, %"], joins.rows()), ""]
+    if methods:
+        lines += [
+            "Ghosts and clutter that are labelled, %, and processor time of stitching, ms a frame:"
+        ]
+        head = [*list(CONDITIONS)[1:], *(f"ms, {c}" for c in CONDITIONS)]
+        lines += ["", *table(["", *head], rest), ""]
+        lines += ["Joins of all methods in bursts, by how probable they were held:", ""]
+        lines += [*table(["held for", "joins", "mean, %", "right, %"], joins.rows()), ""]
     lines += ["IDF1, alone → stitched:", ""]
     lines += table(["capture", "condition", "oracle 10", "oracle 60", *methods, DEFAULT], each)
     return [*lines, "", f"{conditions()}."]
