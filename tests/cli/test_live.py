@@ -64,7 +64,7 @@ def test_standard_output_is_a_sink_and_nothing_else(capture, capsys):
     assert main(line.split()) == 0
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 300
-    assert json.loads(lines[-1])["tracks"][0]["seen"] in (True, False)
+    assert json.loads(lines[-1])["tracks"]["seen"][0] in (True, False)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
