@@ -14,6 +14,8 @@ import numpy as np
 from asterism.live.protocols.packet_error import PacketError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
 __all__ = [
@@ -22,6 +24,7 @@ __all__ = [
     "decode_2d",
     "decode_markers",
     "decode_points",
+    "encode_2d",
     "encode_markers",
     "encode_nothing",
     "encode_points",
@@ -29,6 +32,7 @@ __all__ = [
 
 _HEADER = 8
 _MM = 1000.0  # per metre
+_SUBPIXELS = 64
 
 
 class Component(IntEnum):
@@ -196,8 +200,28 @@ def _rows(body: bytes | memoryview, kind: Component, order: str) -> NDArray[np.v
     return np.frombuffer(body, dtype, count=n, offset=8)
 
 
+def encode_2d(cameras: Sequence[NDArray[np.float64]], order: str = "<") -> bytes:
+    """Make the component of image points.
+
+    Parameters
+    ----------
+    cameras : sequence of ndarray, each of shape (n, 2)
+        Image points of each camera, pixels. They are sent in units of 1/64 pixel, without a size.
+    order : str
+        Byte order.
+    """
+    parts: list[bytes] = []
+    for pixels in cameras:
+        rows = np.zeros(len(pixels), _IMAGE_ROW[order])
+        rows["x"], rows["y"] = np.rint(pixels * _SUBPIXELS).T
+        parts += [struct.pack(f"{order}IB", len(rows), 0), rows.tobytes()]
+    body = b"".join(parts)
+    size = _HEADER + 8 + len(body)
+    return struct.pack(f"{order}IIIHH", size, Component.IMAGE_POINTS, len(cameras), 0, 0) + body
+
+
 def decode_2d(body: bytes | memoryview, order: str = "<") -> list[NDArray[np.float64]]:
-    """Return the image points of each camera of a component, in units of 1/64 pixel.
+    """Return the image points of each camera of a component, pixels.
 
     Returns
     -------
@@ -221,6 +245,6 @@ def decode_2d(body: bytes | memoryview, order: str = "<") -> list[NDArray[np.flo
         if n * dtype.itemsize > len(body) - at:
             raise PacketError(f"{n} image points in {len(body)} bytes")
         rows = np.frombuffer(body, dtype, count=n, offset=at)
-        cameras.append(np.column_stack([rows["x"], rows["y"]]).astype(np.float64))
+        cameras.append(np.column_stack([rows["x"], rows["y"]]) / _SUBPIXELS)
         at += n * dtype.itemsize
     return cameras
