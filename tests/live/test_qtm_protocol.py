@@ -23,9 +23,8 @@ from asterism.live.protocols.qtm_components import (
     decode_markers,
     decode_points,
     encode_2d,
-    encode_markers,
     encode_nothing,
-    encode_points,
+    encode_positions,
 )
 from asterism.live.protocols.qtm_parameters import (
     SECTIONS,
@@ -46,9 +45,14 @@ def test_frames_are_decoded_as_they_were_encoded(places, order, residuals, numbe
     missing = data.draw(arrays(np.bool_, len(places)))
     markers = np.where(missing[:, None], np.nan, places)
     ids = data.draw(arrays(np.int64, len(places), elements=st.integers(0, 2**32 - 1)))
+    at = (
+        (Component.MARKERS_RESIDUAL, Component.POINTS_RESIDUAL)
+        if residuals
+        else (Component.MARKERS, Component.POINTS)
+    )
     parts = [
-        encode_markers(markers, residuals=residuals, order=order),
-        encode_points(places, ids, residuals=residuals, order=order),
+        encode_positions(at[0], markers, order=order),
+        encode_positions(at[1], places, ids, order),
         encode_nothing(Component.SKELETON, order),
     ]
     packet = bytearray(qtm.encode_data(12.5, number, parts, order))
@@ -56,11 +60,6 @@ def test_frames_are_decoded_as_they_were_encoded(places, order, residuals, numbe
     assert kind == Packet.DATA
     found = qtm.decode_data(body, order)
     assert (found.time, found.number, len(found.components)) == (12.5, number, 3)
-    at = (
-        (Component.MARKERS_RESIDUAL, Component.POINTS_RESIDUAL)
-        if residuals
-        else (Component.MARKERS, Component.POINTS)
-    )
     got = decode_markers(found.components[at[0]], residuals=residuals, order=order)
     np.testing.assert_array_equal(got, markers)
     got, got_ids = decode_points(found.components[at[1]], residuals=residuals, order=order)
@@ -70,7 +69,8 @@ def test_frames_are_decoded_as_they_were_encoded(places, order, residuals, numbe
 
 def test_missing_markers_have_all_bits_set():
     # Clients compare the 32 bits; another NaN would be a marker to them.
-    packet = encode_markers(np.array([[np.nan] * 3, [1.0, 2.0, 3.0]]))
+    markers = np.array([[np.nan] * 3, [1.0, 2.0, 3.0]])
+    packet = encode_positions(Component.MARKERS, markers)
     assert packet[16:28] == b"\xff" * 12
     assert struct.unpack("<3f", packet[28:40]) == (1000.0, 2000.0, 3000.0)
 
@@ -95,7 +95,10 @@ def test_garbage_raises_only_the_error_of_packets(data, order):
 
 @given(st.integers(0, 10**6), st.integers(0, 10**6))
 def test_truncated_and_altered_packets(cut, change):
-    parts = [encode_points(np.ones((5, 3)), np.arange(5)), encode_markers(np.ones((4, 3)))]
+    parts = [
+        encode_positions(Component.POINTS, np.ones((5, 3)), np.arange(5)),
+        encode_positions(Component.MARKERS, np.ones((4, 3))),
+    ]
     body = qtm.encode_data(1.0, 7, parts)[8:]
     with pytest.raises(PacketError):
         qtm.decode_data(body[: cut % len(body)])

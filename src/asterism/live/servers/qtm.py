@@ -25,9 +25,8 @@ from asterism.live.protocols.qtm import Event, Packet
 from asterism.live.protocols.qtm_components import (
     Component,
     encode_2d,
-    encode_markers,
     encode_nothing,
-    encode_points,
+    encode_positions,
 )
 from asterism.live.servers.base import Server
 from asterism.live.servers.listening import tcp_listener, udp_socket
@@ -320,11 +319,9 @@ def _packet(
 def _component(kind: Component, order: str, frame: ServedFrame) -> bytes:
     match kind:
         case Component.MARKERS | Component.MARKERS_RESIDUAL:
-            residuals = kind is Component.MARKERS_RESIDUAL
-            return encode_markers(frame.markers, residuals=residuals, order=order)
+            return encode_positions(kind, frame.markers, order=order)
         case Component.POINTS | Component.POINTS_RESIDUAL:
-            residuals = kind is Component.POINTS_RESIDUAL
-            return encode_points(frame.points, frame.ids, residuals=residuals, order=order)
+            return encode_positions(kind, frame.points, frame.ids, order)
         case Component.IMAGE_POINTS:
             return encode_2d(frame.images or (), order)
         case _:
