@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+import asterism as am
 from asterism.live.protocols import qtm
 from asterism.live.protocols.packet_error import PacketError
 from asterism.live.protocols.qtm import Event, Packet
@@ -20,11 +22,16 @@ from asterism.live.protocols.qtm_components import (
     decode_2d,
     decode_markers,
     decode_points,
-    encode_markers,
+    encode_2d,
     encode_nothing,
-    encode_points,
+    encode_positions,
 )
-from asterism.live.protocols.qtm_parameters import SECTIONS, encode_parameters, read_parameters
+from asterism.live.protocols.qtm_parameters import (
+    SECTIONS,
+    encode_parameters,
+    read_calibration,
+    read_parameters,
+)
 
 ORDERS = st.sampled_from("<>")
 # Coordinates that millimetres hold exactly in 32 bits.
@@ -38,9 +45,14 @@ def test_frames_are_decoded_as_they_were_encoded(places, order, residuals, numbe
     missing = data.draw(arrays(np.bool_, len(places)))
     markers = np.where(missing[:, None], np.nan, places)
     ids = data.draw(arrays(np.int64, len(places), elements=st.integers(0, 2**32 - 1)))
+    at = (
+        (Component.MARKERS_RESIDUAL, Component.POINTS_RESIDUAL)
+        if residuals
+        else (Component.MARKERS, Component.POINTS)
+    )
     parts = [
-        encode_markers(markers, residuals=residuals, order=order),
-        encode_points(places, ids, residuals=residuals, order=order),
+        encode_positions(at[0], markers, order=order),
+        encode_positions(at[1], places, ids, order),
         encode_nothing(Component.SKELETON, order),
     ]
     packet = bytearray(qtm.encode_data(12.5, number, parts, order))
@@ -48,11 +60,6 @@ def test_frames_are_decoded_as_they_were_encoded(places, order, residuals, numbe
     assert kind == Packet.DATA
     found = qtm.decode_data(body, order)
     assert (found.time, found.number, len(found.components)) == (12.5, number, 3)
-    at = (
-        (Component.MARKERS_RESIDUAL, Component.POINTS_RESIDUAL)
-        if residuals
-        else (Component.MARKERS, Component.POINTS)
-    )
     got = decode_markers(found.components[at[0]], residuals=residuals, order=order)
     np.testing.assert_array_equal(got, markers)
     got, got_ids = decode_points(found.components[at[1]], residuals=residuals, order=order)
@@ -62,7 +69,8 @@ def test_frames_are_decoded_as_they_were_encoded(places, order, residuals, numbe
 
 def test_missing_markers_have_all_bits_set():
     # Clients compare the 32 bits; another NaN would be a marker to them.
-    packet = encode_markers(np.array([[np.nan] * 3, [1.0, 2.0, 3.0]]))
+    markers = np.array([[np.nan] * 3, [1.0, 2.0, 3.0]])
+    packet = encode_positions(Component.MARKERS, markers)
     assert packet[16:28] == b"\xff" * 12
     assert struct.unpack("<3f", packet[28:40]) == (1000.0, 2000.0, 3000.0)
 
@@ -87,7 +95,10 @@ def test_garbage_raises_only_the_error_of_packets(data, order):
 
 @given(st.integers(0, 10**6), st.integers(0, 10**6))
 def test_truncated_and_altered_packets(cut, change):
-    parts = [encode_points(np.ones((5, 3)), np.arange(5)), encode_markers(np.ones((4, 3)))]
+    parts = [
+        encode_positions(Component.POINTS, np.ones((5, 3)), np.arange(5)),
+        encode_positions(Component.MARKERS, np.ones((4, 3))),
+    ]
     body = qtm.encode_data(1.0, 7, parts)[8:]
     with pytest.raises(PacketError):
         qtm.decode_data(body[: cut % len(body)])
@@ -102,7 +113,44 @@ def test_truncated_and_altered_packets(cut, change):
 def test_image_points_of_cameras():
     camera = struct.pack("<Ib", 2, 0) + struct.pack("<iihhiihh", 64, -128, 5, 6, 1, 2, 3, 4)
     cameras = decode_2d(struct.pack("<IHH", 2, 0, 0) + camera + struct.pack("<Ib", 0, 1))
-    assert [c.tolist() for c in cameras] == [[[64, -128], [1, 2]], []]
+    assert [c.tolist() for c in cameras] == [[[1, -2], [1 / 64, 2 / 64]], []]
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_image_points_are_decoded_as_they_were_encoded(order):
+    cameras = [np.array([[10.25, 700.5], [-0.5, 3.009]]), np.empty((0, 2)), np.array([[1.0, 2.0]])]
+    packet = encode_2d(cameras, order)
+    assert struct.unpack_from(f"{order}II", packet) == (len(packet), Component.IMAGE_POINTS)
+    for got, want in zip(decode_2d(packet[8:], order), cameras, strict=True):
+        np.testing.assert_array_equal(got, np.rint(want * 64) / 64)
+    with pytest.raises(PacketError):
+        decode_2d(packet[8:-1], order)
+
+
+def test_a_calibration_survives_the_settings():
+    lens = am.camera.BrownConrady(-0.1, 0.02, 1e-3, -1e-3, 0.01)
+    rig = am.Rig(tuple(replace(c, lens=lens) for c in am.Rig.ring(3, radius=3, height=2)))
+    text = encode_parameters(("general", "calibration"), "1.25", names=(), rate=100.0, rig=rig)
+    assert read_parameters(text) == (100.0, (), rig.names)
+    found = read_calibration(text)
+    assert found.names == rig.names
+    points = np.random.default_rng(1).uniform(-1, 1, (20, 3))
+    want = rig.project(points).pixels
+    np.testing.assert_allclose(found.project(points).pixels, want, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("<a/>", "without a calibration"),
+        ("<a><calibration/></a>", "its cameras"),
+        ("<a><calibration><cameras><camera/></cameras></calibration></a>", "camera 1"),
+        ("<a", "cannot be read"),
+    ],
+)
+def test_settings_without_a_calibration(text, reason):
+    with pytest.raises(PacketError, match=reason):
+        read_calibration(text)
 
 
 def test_packets_are_split_wherever_they_are_cut():
@@ -129,7 +177,7 @@ def test_a_lost_boundary_of_packets_is_noticed(size, kind):
 def test_names_survive_the_settings(names):
     text = encode_parameters(SECTIONS, "1.25", names=tuple(names), rate=240.0)
     kept = tuple("".join(c for c in n if " " <= c < "\ufffe" or c > "\uffff") for n in names)
-    assert read_parameters(text) == (240.0, kept)
+    assert read_parameters(text) == (240.0, kept, ())
 
 
 def test_settings_with_entities_are_refused():

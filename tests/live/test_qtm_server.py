@@ -29,7 +29,7 @@ def test_versions_are_agreed_as_by_the_vendor(minor):
         kind, text = client.ask("GetParameters General 3D 6D")
         assert kind == Packet.XML
         assert text.startswith(f"<QTM_Parameters_Ver_1.{minor}>")
-        assert read_parameters(text) == (240.0, NAMES)
+        assert read_parameters(text) == (240.0, NAMES, ())
 
 
 @pytest.mark.parametrize(

@@ -45,7 +45,7 @@ def test_labelled_markers_with_their_names():
     thread, sent = serving(corrupted, server, labelled=True)
     with Client(server.port) as client:
         settings = read_parameters(client.ask("GetParameters General 3D")[1])
-        assert settings == (240.0, corrupted.names)
+        assert settings == (240.0, corrupted.names, ())
         client.send("StreamFrames AllFrames 3D 3DNoLabels")
         positions, d = corrupted.positions(), corrupted.detections
         for t in range(60):
@@ -190,7 +190,9 @@ def test_an_interrupted_command_ends_cleanly(tmp_path):
         (["IN", "--as", "natnet", "--multicast", "10.0.0.1"], "--multicast: expected a multicast"),
         (["IN", "--host", "example"], "--host: expected an IPv4 address"),
         (["IN", "--corrupt", "missing=2"], "--corrupt missing"),
-        (["IN", "--labelled", "--seed", "1"], "--seed: expected --corrupt to go with it"),
+        (["IN", "--labelled", "--seed", "1"], "--seed: expected --corrupt or --seeing to go"),
+        (["IN", "--seeing", "missing=0.1"], "--seeing: expected --rig to go with it"),
+        (["IN", "--rig", "ring4", "--as", "natnet"], "--rig: expected --as qtm to go with it"),
         (["nothing.c3d"], "nothing.c3d: no such file"),
     ],
 )

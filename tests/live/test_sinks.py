@@ -53,7 +53,11 @@ def test_servers_keep_every_marker_at_its_place():
     sink = ServerSink("qtm", QtmServer(port=0, discovery_port=0))
     sink.open(HEADER)
     with Client(sink.server.port) as client:
-        assert read_parameters(client.ask("GetParameters General 3D")[1]) == (100.0, HEADER.names)
+        assert read_parameters(client.ask("GetParameters General 3D")[1]) == (
+            100.0,
+            HEADER.names,
+            (),
+        )
         client.send("StreamFrames AllFrames 3D 3DNoLabels")
         assert sink.server.wait_for_client(5)
         frame = live_frame(8)

@@ -18,7 +18,7 @@ import asterism as am
 from asterism.errors import ParameterError, SourceError, SourceLost
 from asterism.live.protocols import qtm
 from asterism.live.protocols.qtm import Packet
-from asterism.live.protocols.qtm_components import encode_points
+from asterism.live.protocols.qtm_components import Component, encode_positions
 from asterism.live.sources.base import EndOfSource
 from asterism.live.sources.json_lines import StandardInput, UdpSource
 from asterism.live.sources.lsl import LslSource
@@ -94,7 +94,8 @@ def one_answer(answers):
 
 
 def test_qtm_counts_garbage_and_goes_on():
-    good = qtm.encode_data(1.0, 5, [encode_points(np.ones((2, 3)), np.arange(2))])
+    points = encode_positions(Component.POINTS, np.ones((2, 3)), np.arange(2))
+    good = qtm.encode_data(1.0, 5, [points])
     bad = qtm.encode_data(1.0, 4, [struct.pack("<II", 999, 2)])
     welcome = qtm.encode_text(Packet.COMMAND, "QTM RT Interface connected")
     port, thread = one_answer([welcome, bad, good[:11], good[11:], struct.pack("<II", 3, 3)])

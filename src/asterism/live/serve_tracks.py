@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from asterism.camera import Observations
 from asterism.checks import check_kind
 from asterism.errors import ParameterError
+from asterism.live.servers.qtm import QtmServer
 from asterism.live.servers.served_frame import ServedFrame
 from asterism.model import Tracks
 
@@ -31,6 +33,7 @@ def serve(
     server: Server,
     *,
     labelled: bool = False,
+    observations: Observations | None = None,
     loop: bool = False,
     begin: Callable[[], None] | None = None,
     stop: Event | None = None,
@@ -50,6 +53,10 @@ def serve(
         Whether named tracks are sent as labelled markers; without any name, all tracks. By default
         every point is sent without a label and with an identity that is new in each frame, so that
         clients see nothing of the tracks.
+    observations : Observations, optional
+        Image points of the cameras of a `QtmServer` in each frame of the tracks, such as
+        `asterism.simulate.film` makes. They are sent without their markers, from the top of the
+        image to the bottom.
     loop : bool
         Whether the capture is repeated until `stop`; numbers and times of the frames go on.
     begin : callable, optional
@@ -64,7 +71,7 @@ def serve(
     Raises
     ------
     ParameterError
-        If the tracks are 2-D or empty.
+        If the tracks are 2-D or empty, or the image points are of other frames or cameras.
     SinkError
         If a port is in use.
 
@@ -84,6 +91,14 @@ def serve(
     if d.n_axes != 3 or not d.n_points:
         got = f"{d.n_axes}-D" if d.n_points else "no point"
         raise ParameterError("tracks", "3-D points", got)
+    if observations is not None:
+        check_kind("observations", observations, Observations)
+        rig = server.rig if isinstance(server, QtmServer) else None
+        if rig is None or observations.cameras != rig.names:
+            expected = "image points of the cameras of the server, a QtmServer with a rig"
+            raise ParameterError("observations", expected, ", ".join(observations.cameras))
+        if observations.n_frames != d.n_frames:
+            raise ParameterError("observations", f"{d.n_frames} frames", observations.n_frames)
     place = _places(tracks) if labelled else np.full(tracks.n_tracks + 1, -1)
     chosen = [k for k in range(tracks.n_tracks) if place[k] >= 0]
     server.names = tuple(re.sub(r"\s+", "_", tracks.display_names[k]) for k in chosen)
@@ -95,7 +110,7 @@ def serve(
         while not server.wait_for_client(_WAIT):
             if stop is not None and stop.is_set():
                 return 0
-        return _send_all(tracks, place, server, loop=loop, stop=stop)
+        return _send_all(tracks, place, observations, server, loop=loop, stop=stop)
     finally:
         server.finish()
         server.close()
@@ -110,7 +125,13 @@ def _places(tracks: Tracks) -> NDArray[np.int64]:
 
 
 def _send_all(
-    tracks: Tracks, place: NDArray[np.int64], server: Server, *, loop: bool, stop: Event | None
+    tracks: Tracks,
+    place: NDArray[np.int64],
+    seen: Observations | None,
+    server: Server,
+    *,
+    loop: bool,
+    stop: Event | None,
 ) -> int:
     d = tracks.detections
     at = place[tracks.labels]
@@ -133,10 +154,18 @@ def _send_all(
             others = points[~is_marker]
             ids = n_points + 1 + np.arange(len(others), dtype=np.int64)
             n_points += len(others)
+            images: list[NDArray[np.float64]] | None = None
+            if seen is not None:
+                # The order of the image points would show their markers.
+                every = [seen.points(t, c) for c in range(seen.n_cameras)]
+                images = [pixels[np.lexsort(pixels.T)] for pixels in every]
             n_sent += 1
             server.send(
-                ServedFrame(number=n_sent, time=seconds, markers=markers, points=others, ids=ids)
-            )
+                ServedFrame(
+                    number=n_sent, time=seconds, markers=markers, points=others, ids=ids,
+                    images=images,
+                )
+            )  # fmt: skip
         if not loop:
             return n_sent
         if stop is not None and stop.is_set():

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["Triangulation", "per_camera", "triangulate"]
 
 _ROUNDS = 20
-_MIN_STEP = 1e-13  # share of a point's distance; smaller steps are rounding
+_MIN_STEP = 1e-9  # share of a point's distance; the step after a smaller one is rounding
 _FLATTEST = 1e12  # largest condition of the information, as in `Rig.coverage`
 
 

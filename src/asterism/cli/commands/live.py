@@ -25,8 +25,8 @@ _From = Annotated[
     str,
     typer.Argument(
         metavar="FROM",
-        help="Source: qtm://HOST, natnet://HOST, lsl://NAME, udp://:PORT, - for standard input, or "
-        "a capture to replay, trial.c3d?speed=2.",
+        help="Source: qtm://HOST, or qtm://HOST?2d for its image points, natnet://HOST, "
+        "lsl://NAME, udp://:PORT, - for standard input, or a capture to replay, trial.c3d?speed=2.",
     ),
 ]
 _To = Annotated[

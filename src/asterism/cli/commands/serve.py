@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from asterism.cli.console import Json, Overwrite, Quiet, print_json, print_table
+from asterism.cli.console import Json, Overwrite, Quiet, print_json, print_table, progress
 from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -71,6 +71,24 @@ _Corruption = Annotated[
         "repeated.",
     ),
 ]
+_Rig = Annotated[
+    str | None,
+    typer.Option(
+        "--rig",
+        metavar="RIG",
+        help="Serve image points of cameras too, for qtm: a calibration (file or folder), or a "
+        "layout such as ring8 or wall4.",
+        show_default=False,
+    ),
+]
+_Seeing = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--seeing",
+        metavar="NAME=VALUE",
+        help="Property of the camera images, as for `asterism film`; may be repeated.",
+    ),
+]
 _Truth = Annotated[
     Path | None,
     typer.Option(
@@ -95,6 +113,8 @@ def serve(
     markers: _Markers = None,
     option: _Options = None,
     corruption: _Corruption = None,
+    rig: _Rig = None,
+    seeing: _Seeing = None,
     save: _Truth = None,
     seed: _Seed = None,
     overwrite: Overwrite = False,
@@ -113,6 +133,8 @@ def serve(
         asterism serve walk.c3d --as natnet --labelled --loop
 
         asterism serve --scene person --corrupt missing=0.05 --corrupt burst=3 --truth truth.csv
+
+        asterism serve --scene person --rig ring8 --seeing noise_px=0.2
     """
     import asterism as am
     from asterism.cli.options import as_options
@@ -126,11 +148,17 @@ def serve(
         with as_options({"path": "--truth"}):
             format_to_write(save, None)
     check_outputs({"--truth": save}, [capture], overwrite=overwrite)
-    server = _server(system, host, port, version, multicast)
+    if rig is None and seeing:
+        raise ParameterError("--seeing", "--rig to go with it", "none")
     given = {"frames": frames, "rate": rate, "markers": markers}
     tracks, about = _tracks(
-        capture, scene, given, option or [], corruption or [], seed, labelled=labelled
-    )
+        capture, scene, given, option or [], corruption or [], seed,
+        labelled=labelled, is_seeing=bool(seeing),
+    )  # fmt: skip
+    cameras, observations = None, None
+    if rig is not None:
+        cameras, about["rig"], observations = _filmed(tracks, rig, seeing or [], seed or 0)
+    server = _server(system, host, port, version, multicast, cameras)
     if save is not None:
         am.write(tracks, save)
 
@@ -147,26 +175,52 @@ def serve(
                 (f"{system.value} server", address),
                 ("frames", f"{d.n_frames} at {server.rate:g} Hz"),
                 ("labelled markers", len(server.names)),
+                *([("cameras", about["rig"])] if rig is not None else []),
                 *([] if save is None else [("truth", save)]),
                 ("stop with", "Ctrl-C"),
             ]
             print_table(rows)
 
-    n_sent = am.live.serve(tracks, server, labelled=labelled, loop=loop, begin=begin)
+    n_sent = am.live.serve(
+        tracks, server, labelled=labelled, observations=observations, loop=loop, begin=begin
+    )
     if not (quiet or json):
         missed = ", ".join(f"{n} × {reason}" for reason, n in server.faults.items())
         print_table([("frames sent", n_sent), ("missed by clients", missed or "none")])
 
 
+def _filmed(
+    tracks: am.Tracks, rig: str, seeing: list[str], seed: int
+) -> tuple[am.Rig, str, am.camera.Observations]:
+    """Return the cameras, their description and their image points of the tracks."""
+    from asterism.cli.filming import film_all
+    from asterism.cli.recording import rig_from, seeing_from
+
+    points = tracks.detections.points[tracks.labels >= 0]
+    if not len(points):
+        raise ParameterError("--rig", "points in tracks", "none", "run asterism track first")
+    cameras, about = rig_from(rig, points)
+    with progress("filming", tracks.detections.n_frames) as advance:
+        footage = film_all(tracks, cameras, advance, seeing_from(seeing), seed)
+    return cameras, about, footage.observations
+
+
 def _server(
-    system: _System, host: str, port: int | None, version: str | None, multicast: str | None
+    system: _System,
+    host: str,
+    port: int | None,
+    version: str | None,
+    multicast: str | None,
+    rig: am.Rig | None,
 ) -> am.live.QtmServer | am.live.NatNetServer:
     from asterism.cli.options import as_options
     from asterism.live.servers import natnet, qtm
     from asterism.live.sinks.parse import version_of
 
-    with as_options({"host": "--host", "version": "--version", "multicast": "--multicast"}):
+    with as_options({name: f"--{name}" for name in ("host", "rig", "version", "multicast")}):
         if system is _System.natnet:
+            if rig is not None:
+                raise ParameterError("--rig", "--as qtm to go with it", "--as natnet")
             chosen = version_of("version", version or "4.1")
             return natnet.NatNetServer(
                 host, port or natnet.PORT, version=chosen, multicast=multicast or ""
@@ -174,7 +228,7 @@ def _server(
         if version is not None or multicast is not None:
             got = "--version" if version is not None else "--multicast"
             raise ParameterError("--as qtm", "no option of NatNet", got)
-        return qtm.QtmServer(host, port or qtm.PORT, is_replay=True)
+        return qtm.QtmServer(host, port or qtm.PORT, is_replay=True, rig=rig)
 
 
 def _tracks(
@@ -186,6 +240,7 @@ def _tracks(
     seed: int | None,
     *,
     labelled: bool,
+    is_seeing: bool,
 ) -> tuple[am.Tracks, dict[str, Any]]:
     """Read the capture or make the scene, and corrupt it."""
     import asterism as am
@@ -203,8 +258,8 @@ def _tracks(
         if found := [name for name, value in own.items() if value is not None]:
             raise ParameterError("CAPTURE", "no option of a scene", ", ".join(found))
         tracks, about = am.io.read_tracks(capture), {"input": str(capture)}
-        if seed is not None and not is_mixed:
-            raise ParameterError("--seed", "--corrupt to go with it", "none")
+        if seed is not None and not (is_mixed or is_seeing):
+            raise ParameterError("--seed", "--corrupt or --seeing to go with it", "none")
     if is_mixed:
         with as_options({name: f"--corrupt {name}" for name in switches} | {"seed": "--seed"}):
             tracks = am.simulate.corrupt(tracks, **switches, keep_unnamed=True, seed=seed or 0)

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from asterism.camera import Camera, Rig
 
-__all__ = ["read", "sniff", "write"]
+__all__ = ["encode", "from_element", "read", "sniff", "write"]
 
 _SUBPIXELS = 64
 _HALF_TURN = np.diag([1.0, -1.0, -1.0])  # about x; its own inverse
@@ -74,9 +74,32 @@ def read(path: Path, units: str | None) -> Rig:
     ('cam1', 'cam2')
     """
     del units
+    return from_element(path, load(path, "calibration"))
+
+
+def from_element(path: Path, calibration: Element) -> Rig:
+    """Return the cameras of a calibration in XML.
+
+    Parameters
+    ----------
+    path : Path
+        File, for errors.
+    calibration : Element
+        Element ``calibration``, of a file or of the settings of a running system.
+
+    Returns
+    -------
+    Rig
+        As for `read`.
+
+    Raises
+    ------
+    FormatError
+        As for `read`.
+    """
     cameras: list[Camera] = []
     warnings: list[str] = []
-    for i, element in enumerate(load(path, "calibration").iterfind("cameras/camera")):
+    for i, element in enumerate(calibration.iterfind("cameras/camera")):
         name = element.get("serial", "")
         place = f"camera {name or i + 1}"
         if element.get("active", "1") == "0" or element.get("calibrated", "true") == "false":
@@ -141,6 +164,17 @@ def write(rig: Rig) -> bytes:
     >>> write(am.Rig.ring(1, radius=3, height=2)).decode().splitlines()[1]
     '<calibration type="regular" source="Asterism">'
     """
+    return to_bytes(encode(rig))
+
+
+def encode(rig: Rig) -> Element:
+    """Return the XML of a calibration, the element ``calibration``; see `write`.
+
+    Raises
+    ------
+    ParameterError
+        As for `write`.
+    """
     root = Element("calibration", {"type": "regular", "source": "Asterism"})
     cameras = SubElement(root, "cameras")
     for camera, name in zip(rig, names_of(rig), strict=True):
@@ -167,4 +201,4 @@ def write(rig: Rig) -> bytes:
             **dict(zip(_LENS, brown_coefficients(camera, "qca"), strict=True)),
         }  # fmt: skip
         SubElement(element, "intrinsic", {key: repr(float(x)) for key, x in intrinsic.items()})
-    return to_bytes(root)
+    return root

@@ -14,6 +14,8 @@ import numpy as np
 from asterism.live.protocols.packet_error import PacketError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
 __all__ = [
@@ -22,13 +24,14 @@ __all__ = [
     "decode_2d",
     "decode_markers",
     "decode_points",
-    "encode_markers",
+    "encode_2d",
     "encode_nothing",
-    "encode_points",
+    "encode_positions",
 ]
 
 _HEADER = 8
 _MM = 1000.0  # per metre
+_SUBPIXELS = 64
 
 
 class Component(IntEnum):
@@ -101,58 +104,33 @@ def encode_nothing(kind: Component, order: str = "<") -> bytes:
     return struct.pack(f"{order}III", _HEADER + 4, kind, 0)
 
 
-def encode_markers(
-    markers: NDArray[np.float64], *, residuals: bool = False, order: str = "<"
+def encode_positions(
+    kind: Component,
+    positions: NDArray[np.float64],
+    ids: NDArray[np.int64] | None = None,
+    order: str = "<",
 ) -> bytes:
-    """Make the component of labelled markers.
+    """Make a component of labelled markers or of unlabelled points.
 
     Parameters
     ----------
-    markers : ndarray of shape (K, 3)
-        Positions in the order of the labels, metres; NaN for a missing marker.
-    residuals : bool
-        Whether each marker has a residual, which is written as 0.
+    kind : Component
+        One of MARKERS, MARKERS_RESIDUAL, POINTS and POINTS_RESIDUAL. A residual is written as 0.
+    positions : ndarray of shape (N, 3)
+        Metres; markers in the order of the labels, NaN for a missing one.
+    ids : ndarray of int, shape (N,), optional
+        Number of each unlabelled point, of which the lowest 32 bits are sent.
     order : str
         Byte order.
     """
-    kind = Component.MARKERS_RESIDUAL if residuals else Component.MARKERS
-    rows = np.zeros(len(markers), _ROWS[order, kind])
-    rows["place"] = markers * _MM
-    missing = np.isnan(markers).any(axis=1)
+    rows = np.zeros(len(positions), _ROWS[order, kind])
+    rows["place"] = positions * _MM
+    missing = np.isnan(positions).any(axis=1)
     if missing.any():
         # Clients test a missing marker by all 32 bits, which is one of many patterns of NaN.
         rows.view(f"{order}u4").reshape(len(rows), -1)[missing, :3] = 0xFFFFFFFF
-    return _component(kind, rows, order)
-
-
-def encode_points(
-    points: NDArray[np.float64],
-    ids: NDArray[np.int64],
-    *,
-    residuals: bool = False,
-    order: str = "<",
-) -> bytes:
-    """Make the component of unlabelled points.
-
-    Parameters
-    ----------
-    points : ndarray of shape (N, 3)
-        Positions, metres.
-    ids : ndarray of int, shape (N,)
-        Number of each point, of which the lowest 32 bits are sent.
-    residuals : bool
-        Whether each point has a residual, which is written as 0.
-    order : str
-        Byte order.
-    """
-    kind = Component.POINTS_RESIDUAL if residuals else Component.POINTS
-    rows = np.zeros(len(points), _ROWS[order, kind])
-    rows["place"] = points * _MM
-    rows["id"] = ids & 0xFFFFFFFF
-    return _component(kind, rows, order)
-
-
-def _component(kind: Component, rows: NDArray[np.void], order: str) -> bytes:
+    if ids is not None:
+        rows["id"] = ids & 0xFFFFFFFF
     size = _HEADER + 8 + rows.nbytes
     return struct.pack(f"{order}IIIHH", size, kind, len(rows), 0, 0) + rows.tobytes()
 
@@ -196,8 +174,28 @@ def _rows(body: bytes | memoryview, kind: Component, order: str) -> NDArray[np.v
     return np.frombuffer(body, dtype, count=n, offset=8)
 
 
+def encode_2d(cameras: Sequence[NDArray[np.float64]], order: str = "<") -> bytes:
+    """Make the component of image points.
+
+    Parameters
+    ----------
+    cameras : sequence of ndarray, each of shape (n, 2)
+        Image points of each camera, pixels. They are sent in units of 1/64 pixel, without a size.
+    order : str
+        Byte order.
+    """
+    parts: list[bytes] = []
+    for pixels in cameras:
+        rows = np.zeros(len(pixels), _IMAGE_ROW[order])
+        rows["x"], rows["y"] = np.rint(pixels * _SUBPIXELS).T
+        parts += [struct.pack(f"{order}IB", len(rows), 0), rows.tobytes()]
+    body = b"".join(parts)
+    size = _HEADER + 8 + len(body)
+    return struct.pack(f"{order}IIIHH", size, Component.IMAGE_POINTS, len(cameras), 0, 0) + body
+
+
 def decode_2d(body: bytes | memoryview, order: str = "<") -> list[NDArray[np.float64]]:
-    """Return the image points of each camera of a component, in units of 1/64 pixel.
+    """Return the image points of each camera of a component, pixels.
 
     Returns
     -------
@@ -221,6 +219,6 @@ def decode_2d(body: bytes | memoryview, order: str = "<") -> list[NDArray[np.flo
         if n * dtype.itemsize > len(body) - at:
             raise PacketError(f"{n} image points in {len(body)} bytes")
         rows = np.frombuffer(body, dtype, count=n, offset=at)
-        cameras.append(np.column_stack([rows["x"], rows["y"]]).astype(np.float64))
+        cameras.append(np.column_stack([rows["x"], rows["y"]]) / _SUBPIXELS)
         at += n * dtype.itemsize
     return cameras

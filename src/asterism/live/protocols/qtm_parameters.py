@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import re
-from typing import NamedTuple
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 from xml.etree import ElementTree
 
+from asterism.errors import FormatError
+from asterism.io.calibrations import qca
 from asterism.live.protocols.packet_error import PacketError
 
-__all__ = ["SECTIONS", "Parameters", "encode_parameters", "read_parameters"]
+if TYPE_CHECKING:
+    from asterism.camera import Rig
+
+__all__ = ["SECTIONS", "Parameters", "encode_parameters", "read_calibration", "read_parameters"]
 
 SECTIONS = (
     "general",
@@ -38,14 +44,22 @@ class Parameters(NamedTuple):
         Frame rate of the measurement, Hz; 0 if it is not stated.
     names : tuple of str
         Labels in the order of the component of labelled markers.
+    cameras : tuple of str
+        Serial numbers of the cameras in the order of the component of image points.
     """
 
     rate: float
     names: tuple[str, ...]
+    cameras: tuple[str, ...] = ()
 
 
 def encode_parameters(
-    sections: tuple[str, ...], version: str, *, names: tuple[str, ...], rate: float
+    sections: tuple[str, ...],
+    version: str,
+    *,
+    names: tuple[str, ...],
+    rate: float,
+    rig: Rig | None = None,
 ) -> str:
     """Return the settings as XML.
 
@@ -60,6 +74,8 @@ def encode_parameters(
         Labels of the markers.
     rate : float
         Frame rate, Hz.
+    rig : Rig, optional
+        Cameras, whose names are sent as serial numbers. Without it there is no calibration.
 
     Examples
     --------
@@ -68,7 +84,7 @@ def encode_parameters(
     """
     root = ElementTree.Element(f"QTM_Parameters_Ver_{version}")
     if "general" in sections:
-        _general(root, rate)
+        _general(root, rate, rig)
     if "3d" in sections:
         part = ElementTree.SubElement(root, "The_3D")
         _add(part, "AxisUpwards", "+Z")
@@ -83,10 +99,12 @@ def encode_parameters(
     if "6d" in sections:
         part = ElementTree.SubElement(root, "The_6D")
         _add(part, "Bodies", "0")
+    if "calibration" in sections and rig is not None:
+        root.append(qca.encode(rig))
     return ElementTree.tostring(root, encoding="unicode")
 
 
-def _general(root: ElementTree.Element, rate: float) -> None:
+def _general(root: ElementTree.Element, rate: float, rig: Rig | None) -> None:
     part = ElementTree.SubElement(root, "General")
     _add(part, "Frequency", str(round(rate)))
     _add(part, "Capture_Time", "0.000000")
@@ -122,6 +140,11 @@ def _general(root: ElementTree.Element, rate: float) -> None:
     ElementTree.SubElement(
         part, "EulerAngles", {"First": "Roll", "Second": "Pitch", "Third": "Yaw"}
     )
+    for i, camera in enumerate(rig or ()):
+        found = ElementTree.SubElement(part, "Camera")
+        for tag, text in {"ID": str(i + 1), "Model": "Asterism", "Serial": camera.name}.items():
+            _add(found, tag, text)
+        _add(found, "Mode", "Marker")
 
 
 def _add(parent: ElementTree.Element, tag: str, text: str) -> None:
@@ -129,7 +152,7 @@ def _add(parent: ElementTree.Element, tag: str, text: str) -> None:
 
 
 def read_parameters(text: str) -> Parameters:
-    """Read rate and labels from settings.
+    """Read rate, labels and cameras from settings.
 
     Parameters
     ----------
@@ -144,15 +167,53 @@ def read_parameters(text: str) -> Parameters:
     Examples
     --------
     >>> read_parameters(encode_parameters(("general", "3d"), "1.25", names=("LASI",), rate=240.0))
-    Parameters(rate=240.0, names=('LASI',))
+    Parameters(rate=240.0, names=('LASI',), cameras=())
     """
+    root = _root(text)
+    try:
+        rate = float(root.findtext("General/Frequency") or 0.0)
+    except ValueError as error:
+        raise PacketError(f"settings that cannot be read: {error}") from None
+    names = tuple(label.findtext("Name") or "" for label in root.iterfind("The_3D/Label"))
+    cameras = tuple(each.findtext("Serial") or "" for each in root.iterfind("General/Camera"))
+    return Parameters(rate if 0 < rate < 1e6 else 0.0, names, cameras)
+
+
+def read_calibration(text: str) -> Rig:
+    """Read the calibrated cameras from settings.
+
+    Parameters
+    ----------
+    text : str
+        XML with the section Calibration.
+
+    Raises
+    ------
+    PacketError
+        If it is not XML, or has no calibrated camera.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> rig = am.Rig.ring(2, radius=3, height=2)
+    >>> text = encode_parameters(("calibration",), "1.25", names=(), rate=240.0, rig=rig)
+    >>> read_calibration(text).names
+    ('cam1', 'cam2')
+    """
+    calibration = _root(text).find("calibration")
+    if calibration is None:
+        raise PacketError("settings without a calibration")
+    try:
+        return qca.from_element(Path("calibration"), calibration)
+    except FormatError as error:
+        raise PacketError(str(error)) from None
+
+
+def _root(text: str) -> ElementTree.Element:
     # An entity that refers to entities could grow without bound.
     if len(text) > _LONGEST or "<!DOCTYPE" in text:
         raise PacketError("settings that are too long or define entities")
     try:
-        root = ElementTree.fromstring(text)
-        rate = float(root.findtext("General/Frequency") or 0.0)
-    except (ElementTree.ParseError, ValueError) as error:
+        return ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
         raise PacketError(f"settings that cannot be read: {error}") from None
-    names = tuple(label.findtext("Name") or "" for label in root.iterfind("The_3D/Label"))
-    return Parameters(rate if 0 < rate < 1e6 else 0.0, names)

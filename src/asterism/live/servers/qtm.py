@@ -15,15 +15,18 @@ import threading
 from typing import TYPE_CHECKING, cast
 
 import asterism
+from asterism.camera import Rig
+from asterism.checks import check_kind
 from asterism.errors import SinkError
+from asterism.io.calibrations import qca
 from asterism.live.protocols import qtm
 from asterism.live.protocols.packet_error import PacketError
 from asterism.live.protocols.qtm import Event, Packet
 from asterism.live.protocols.qtm_components import (
     Component,
-    encode_markers,
+    encode_2d,
     encode_nothing,
-    encode_points,
+    encode_positions,
 )
 from asterism.live.servers.base import Server
 from asterism.live.servers.listening import tcp_listener, udp_socket
@@ -64,11 +67,19 @@ class QtmServer(Server):
         Whether clients see a file that is played instead of a measurement.
     discovery_port : int
         UDP port for discovery; 0 for none.
+    rig : Rig, optional
+        Cameras of the image points, whose calibration clients can ask for.
 
     Attributes
     ----------
     faults : dict of str to int
         Number of frames that clients missed, by reason.
+
+    Raises
+    ------
+    ParameterError
+        If a calibration of Qualisys cannot hold the cameras (another lens than `BrownConrady`,
+        skew, the same name twice).
 
     Examples
     --------
@@ -88,8 +99,13 @@ class QtmServer(Server):
         rate: float = 0.0,
         is_replay: bool = False,
         discovery_port: int = DISCOVERY_PORT,
+        rig: Rig | None = None,
     ) -> None:
         super().__init__(host, port, names, rate)
+        if rig is not None:
+            check_kind("rig", rig, Rig, "am.read_rig(path)")
+            qca.encode(rig)
+        self.rig = rig
         self.big_port = port + 1 if port else 0
         self._discovery_port = discovery_port
         self._running = Event.RT_FROM_FILE_STARTED if is_replay else Event.CONNECTED
@@ -246,7 +262,7 @@ class QtmServer(Server):
         client.setblocking(False)
         client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         client.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
-        connection = Connection(client, address, order, self.host)
+        connection = Connection(client, address, order, self.host, self.rig)
         connection.answer("QTM RT Interface connected")
         self._selector.register(client, selectors.EVENT_READ, connection)
         with self._lock:
@@ -279,7 +295,8 @@ class QtmServer(Server):
         try:
             packet, address = found.recvfrom(64)
             port = qtm.decode_discovery(packet)
-            about = f"{socket.gethostname()}, Asterism {asterism.__version__}, 0 cameras"
+            n = 0 if self.rig is None else len(self.rig)
+            about = f"{socket.gethostname()}, Asterism {asterism.__version__}, {n} cameras"
             found.sendto(qtm.encode_discovered(about, self.port - 1), (address[0], port))
         except (OSError, PacketError, struct.error):
             return  # no client, or one that is gone
@@ -302,10 +319,10 @@ def _packet(
 def _component(kind: Component, order: str, frame: ServedFrame) -> bytes:
     match kind:
         case Component.MARKERS | Component.MARKERS_RESIDUAL:
-            residuals = kind is Component.MARKERS_RESIDUAL
-            return encode_markers(frame.markers, residuals=residuals, order=order)
+            return encode_positions(kind, frame.markers, order=order)
         case Component.POINTS | Component.POINTS_RESIDUAL:
-            residuals = kind is Component.POINTS_RESIDUAL
-            return encode_points(frame.points, frame.ids, residuals=residuals, order=order)
+            return encode_positions(kind, frame.points, frame.ids, order)
+        case Component.IMAGE_POINTS:
+            return encode_2d(frame.images or (), order)
         case _:
             return encode_nothing(kind, order)

@@ -20,6 +20,7 @@ from asterism.live.servers.listening import is_loopback
 if TYPE_CHECKING:
     import socket
 
+    from asterism.camera import Rig
     from asterism.live.servers.served_frame import ServedFrame
 
 __all__ = ["NEWEST", "OLDEST", "Connection"]
@@ -55,11 +56,19 @@ class Connection:
         Byte order of its port.
     host : str
         Interface of the server.
+    rig : Rig or None
+        Cameras of the server.
     """
 
     def __init__(
-        self, client: socket.socket, address: tuple[str, int], order: str, host: str
+        self,
+        client: socket.socket,
+        address: tuple[str, int],
+        order: str,
+        host: str,
+        rig: Rig | None = None,
     ) -> None:
+        self._rig = rig
         self.socket, self.address, self.order, self._host = client, address, order, host
         self.version = _UNSET
         self.request: FrameRequest | None = None
@@ -199,7 +208,8 @@ class Connection:
             self.answer("Parse error", Packet.ERROR)
             return
         version = "{}.{}".format(*self.version)
-        self.answer(encode_parameters(sections, version, names=names, rate=rate), Packet.XML)
+        text = encode_parameters(sections, version, names=names, rate=rate, rig=self._rig)
+        self.answer(text, Packet.XML)
 
     def _deliver(self, word: str, words: list[str], state: Event) -> None:
         try:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 from asterism.records import record
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -29,6 +31,8 @@ class ServedFrame:
         Points without a name, metres.
     ids : ndarray of int, shape (N,)
         Number that identifies each such point between frames; 0 for none.
+    images : sequence of ndarray, each of shape (n, 2), optional
+        Image points of each camera of the server, pixels.
 
     Examples
     --------
@@ -43,3 +47,4 @@ class ServedFrame:
     markers: NDArray[np.float64]
     points: NDArray[np.float64]
     ids: NDArray[np.int64]
+    images: Sequence[NDArray[np.float64]] | None = None

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from asterism.errors import ParameterError
+from asterism.io.calibrations import read_rig
 from asterism.live.address import split_address
 from asterism.live.servers import natnet, qtm
 from asterism.live.sources.json_lines import StandardInput, UdpSource
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["parse_source"]
 
 _KNOWN: dict[str, tuple[str, ...]] = {
-    "qtm": (),
+    "qtm": ("2d",),
     "natnet": ("local", "multicast"),
     "lsl": (),
     "udp": (),
@@ -35,9 +36,10 @@ def parse_source(text: str) -> Source:
     Parameters
     ----------
     text : str
-        ``qtm://HOST[:PORT]``, ``natnet://HOST[:PORT][?local=…&multicast=…]``, ``lsl://STREAM``,
-        ``udp://[HOST]:PORT``, ``-`` for standard input, or a capture with ``?speed=2`` or
-        ``?speed=max``.
+        ``qtm://HOST[:PORT]``, with ``?2d`` for points that are reconstructed from the image points
+        of the cameras, by the calibration of the system or that of ``?2d=FILE``;
+        ``natnet://HOST[:PORT][?local=…&multicast=…]``, ``lsl://STREAM``, ``udp://[HOST]:PORT``,
+        ``-`` for standard input, or a capture with ``?speed=2`` or ``?speed=max``.
 
     Returns
     -------
@@ -47,6 +49,8 @@ def parse_source(text: str) -> Source:
     ------
     ParameterError
         If it is none of these.
+    FormatError
+        If the calibration cannot be read.
 
     Examples
     --------
@@ -62,7 +66,10 @@ def parse_source(text: str) -> Source:
         raise ParameterError("FROM", f"{address.scheme}://{word}", repr(text))
     match address.scheme:
         case "qtm":
-            return QtmSource(text, host, port or qtm.PORT)
+            calibration = options.get("2d")
+            rig = read_rig(calibration) if calibration else None
+            images = calibration is not None
+            return QtmSource(text, host, port or qtm.PORT, images=images, rig=rig)
         case "natnet":
             return NatNetSource(text, host, port or natnet.PORT, **options)
         case "lsl":

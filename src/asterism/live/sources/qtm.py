@@ -6,6 +6,8 @@ import contextlib
 import select
 import socket
 import time
+from collections import deque
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -14,15 +16,29 @@ from asterism.live.faults import Faults
 from asterism.live.frame import SourceFrame
 from asterism.live.protocols import qtm
 from asterism.live.protocols.packet_error import PacketError
-from asterism.live.protocols.qtm import Packet
-from asterism.live.protocols.qtm_components import Component, decode_markers, decode_points
-from asterism.live.protocols.qtm_parameters import read_parameters
+from asterism.live.protocols.qtm import DataPacket, Packet
+from asterism.live.protocols.qtm_components import (
+    Component,
+    decode_2d,
+    decode_markers,
+    decode_points,
+)
+from asterism.live.protocols.qtm_parameters import read_calibration, read_parameters
+from asterism.live.sources.camera_images import CameraImages, ImageFrame
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from asterism.camera import Rig
 
 __all__ = ["QtmSource"]
+
+T = TypeVar("T")
 
 _VERSIONS = ("1.25", "1.24", "1.23", "1.22", "1.21", "1.20", "1.19")
 _CONNECT_SECONDS = 5.0
 _READ = 256 * 1024  # bytes
+_TOGETHER = 16  # frames of image points that wait and are reconstructed together, at most
 
 
 class QtmSource:
@@ -36,9 +52,20 @@ class QtmSource:
         The source, as the user wrote it.
     host, port : str and int
         Address of the system, and its port for little-endian clients.
+    images : bool
+        Whether the points are reconstructed from the image points of the cameras (component 2D)
+        instead.
+    rig : Rig, optional
+        Calibration of the cameras, named by their serial numbers. By default the system is asked.
     """
 
-    def __init__(self, name: str, host: str, port: int) -> None:
+    def __init__(
+        self, name: str, host: str, port: int, *, images: bool = False, rig: Rig | None = None
+    ) -> None:
+        self._has_images, self._rig = images, rig
+        self._cameras: tuple[str, ...] = ()
+        self._images: CameraImages | None = None
+        self._ready: deque[SourceFrame] = deque()
         self.name, self._address = name, (host, port)
         self.rate = 0.0
         self.waits = False
@@ -54,10 +81,12 @@ class QtmSource:
         Raises
         ------
         SourceError
-            If the system cannot be reached or refuses.
+            If the system cannot be reached or refuses, or two cameras with a calibration are
+            needed and it has fewer.
         """
         self.close()
         self._received.clear()
+        self._ready.clear()
         try:
             self._socket = socket.create_connection(self._address, _CONNECT_SECONDS)
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -83,11 +112,36 @@ class QtmSource:
             first, last = _VERSIONS[-1], _VERSIONS[0]
             raise SourceError(f"{self.name}: speaks none of the versions {first} to {last}.")
         kind, text = self._ask("GetParameters General 3D")
-        self.rate = 0.0
+        self.rate, cameras = 0.0, tuple[str, ...]()
         if kind == Packet.XML:
             with contextlib.suppress(PacketError):  # the stream is of use without its rate
-                self.rate = read_parameters(text).rate
-        self._send("StreamFrames AllFrames 3D 3DNoLabels")
+                self.rate, _, cameras = read_parameters(text)
+        if self._has_images:
+            self._calibrate(cameras)
+        components = "2D" if self._has_images else "3D 3DNoLabels"
+        self._send(f"StreamFrames AllFrames {components}")
+
+    def _calibrate(self, cameras: tuple[str, ...]) -> None:
+        """Find the calibration of the cameras."""
+        rig = self._rig
+        if rig is None:
+            kind, text = self._ask("GetParameters Calibration")
+            try:
+                if kind != Packet.XML:
+                    raise PacketError(text)
+                rig = read_calibration(text)
+            except PacketError as error:
+                hint = "Calibrate it in QTM, or give a file: ?2d=FILE"
+                text = f"{self.name}: the system has no calibration: {error}. {hint}."
+                raise SourceError(text) from None
+        if len(set(cameras) & set(rig.names)) < 2:
+            found = f"cameras {', '.join(cameras) or 'none'}"
+            raise SourceError(
+                f"{self.name}: expected two cameras of the calibration ({', '.join(rig.names)}) or "
+                f"more, found {found}. Name the cameras of the calibration by serial number."
+            )
+        if self._images is None or cameras != self._cameras:
+            self._images, self._cameras = CameraImages(rig, cameras), cameras
 
     def _send(self, command: str) -> None:
         assert self._socket is not None
@@ -111,13 +165,8 @@ class QtmSource:
         assert self._socket is not None
         end = time.monotonic() + timeout
         while True:
-            found = qtm.split(self._received)
-            if found is not None:
-                kind, view = found
-                body = bytes(view)
-                view.release()
-                del self._received[: len(body) + 8]
-                return kind, body
+            if (packet := self._complete()) is not None:
+                return packet
             left = end - time.monotonic()
             if left < 0 or not select.select([self._socket], [], [], left)[0]:
                 return None
@@ -126,6 +175,17 @@ class QtmSource:
             if not received:
                 raise ConnectionResetError(0, "the system has closed the connection")
             self._received += received
+
+    def _complete(self) -> tuple[int, bytes] | None:
+        """Return the next packet of what was received; None if it is not complete."""
+        found = qtm.split(self._received)
+        if found is None:
+            return None
+        kind, view = found
+        body = bytes(view)
+        view.release()
+        del self._received[: len(body) + 8]
+        return kind, body
 
     def receive(self, timeout: float) -> SourceFrame | None:
         """Wait for the next frame.
@@ -138,25 +198,36 @@ class QtmSource:
         if self._socket is None:
             raise SourceLost(f"{self.name}: is not open.")
         end = time.monotonic() + timeout
-        while True:
+        while not self._ready:
             try:
-                found = self._packet(max(0.0, end - time.monotonic()))
+                packet = self._packet(max(0.0, end - time.monotonic()))
             except (OSError, PacketError) as error:
                 # After a wrong size the boundary of packets is lost.
                 self.close()
                 text = getattr(error, "strerror", None) or str(error)
                 raise SourceLost(f"{self.name}: the connection is lost: {text}.") from error
-            if found is None:
+            if packet is None:
                 return None
-            if found[0] != Packet.DATA:
-                continue
-            try:
-                return self._frame(found[1])
-            except PacketError as error:
-                self._faults.undecoded(error)
+            if self._images is None:
+                self._ready.extend(self._decoded(packet, self._frame))
+            else:
+                frames = self._decoded(packet, self._image_frame)
+                with contextlib.suppress(PacketError):  # it is raised again when all are delivered
+                    while len(frames) < _TOGETHER and (packet := self._complete()) is not None:
+                        frames += self._decoded(packet, self._image_frame)
+                self._ready.extend(self._images.add(frames))
+        return self._ready.popleft()
 
-    def _frame(self, body: bytes) -> SourceFrame:
-        data = qtm.decode_data(body)
+    def _decoded(self, packet: tuple[int, bytes], decode: Callable[[DataPacket], T]) -> list[T]:
+        """Return the frame of a packet, if it has one."""
+        kind, body = packet
+        try:
+            return [decode(qtm.decode_data(body))] if kind == Packet.DATA else []
+        except PacketError as error:
+            self._faults.undecoded(error)
+            return []
+
+    def _frame(self, data: DataPacket) -> SourceFrame:
         points: list[np.ndarray[tuple[int, int], np.dtype[np.float64]]] = []
         if Component.MARKERS in data.components:
             markers = decode_markers(data.components[Component.MARKERS])
@@ -170,6 +241,14 @@ class QtmSource:
             points=np.concatenate([np.empty((0, 3)), *points]),
             received=self._arrived,
         )
+
+    def _image_frame(self, data: DataPacket) -> ImageFrame:
+        if Component.IMAGE_POINTS not in data.components:
+            raise PacketError("a frame without image points")
+        images = decode_2d(data.components[Component.IMAGE_POINTS])
+        if len(images) != len(self._cameras):
+            raise PacketError(f"{len(images)} cameras instead of {len(self._cameras)}")
+        return ImageFrame(data.number, data.time, self._arrived, images)
 
     def close(self) -> None:
         """Disconnect."""
