@@ -192,6 +192,8 @@ def test_served_image_points_say_nothing_of_their_markers(filmed):
         await client.stream_frames(components=["2d"], on_packet=got.append)
         while len(got) < 120:
             await asyncio.sleep(0.01)
+        client.disconnect()
+        await asyncio.sleep(0)
 
     server = QtmServer(port=0, discovery_port=0, rig=rig)
     thread, _ = serving(truth, server, observations=seen)
