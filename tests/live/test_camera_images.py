@@ -189,10 +189,11 @@ def test_served_image_points_say_nothing_of_their_markers(filmed):
 
     async def receive(port):
         client = await qtm_rt.connect("127.0.0.1", port=port, version="1.25")
+        transport = client._protocol.transport
         await client.stream_frames(components=["2d"], on_packet=got.append)
         while len(got) < 120:
             await asyncio.sleep(0.01)
-        client.disconnect()
+        transport.close()  # the client leaves its socket open when the server ends
         await asyncio.sleep(0)
 
     server = QtmServer(port=0, discovery_port=0, rig=rig)
