@@ -22,7 +22,6 @@ from asterism.live.low_latency import low_latency
 from asterism.live.queue import FrameQueue
 from asterism.live.receiver import Connected, Disconnected, Ended, Receiver
 from asterism.live.sinks.page import PageSink
-from asterism.tracking.stitching import MAX_TRACKLET_GAP
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -41,8 +40,6 @@ QUEUE = 256
 """Number of frames that wait at most."""
 MAX_AGE = 1.0
 """Seconds after which a waiting frame is dropped, if a later one waits too."""
-BEHIND = 0.1
-"""Age of a frame, seconds, from which on tracking is behind."""
 FIRST_SECONDS = 2.0
 """Seconds of frames from which the first model is estimated."""
 REFINE = (10.0, 30.0, 60.0)
@@ -161,11 +158,6 @@ class LiveLoop:
                     continue
                 accepted = intake.take(item)
                 if accepted is not None:
-                    # Missing frames are tracked as empty ones. While tracking is behind, that is
-                    # left out for gaps that end no tracklet.
-                    is_behind = not waits and perf_counter() - item.received > BEHIND
-                    if is_behind and accepted.n_missing <= MAX_TRACKLET_GAP:
-                        accepted = accepted._replace(n_missing=0)
                     self._track(accepted, intake.period)
             elif isinstance(item, Ended):
                 if item.error is not None:
