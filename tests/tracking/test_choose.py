@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import json
 import tomllib
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -146,6 +148,25 @@ def test_own_distances_undo_exchanges_of_three_markers(seed, marker):
     assert am.evaluate(refined.tracks, walk).idf1 == 1
     assert expected_right(refined) > n_right
     assert not any(refined.tracks.names)
+
+
+def test_names_that_make_identities_less_certain_are_not_kept(fast, monkeypatch):
+    truth, tracks = fast
+    plan = am.tracking.plan_tracking(truth.detections)
+    model = am.tracking.tracklet_model(plan.recipe.model)
+    tracks = am.Tracks(detections=truth.detections, labels=tracks.labels)
+    found = Uncorrected(tracks=tracks, recipe=plan.recipe, model=model)
+
+    def exchanged(given, _):
+        """Give two tracks of one segment each other's marker for half of the capture."""
+        labels, late = given.labels.copy(), truth.detections.frame_of >= 37
+        labels[late & (given.labels == 0)], labels[late & (given.labels == 1)] = 1, 0
+        return SimpleNamespace(tracks=dataclasses.replace(given, labels=labels))
+
+    monkeypatch.setattr("asterism.tracking.attempts.name_tracks", exchanged)
+    n_right = expected_right(found)
+    assert n_right < 0.998 * (tracks.labels >= 0).sum()
+    assert refined_by_own_distances(found, n_right) is found
 
 
 @pytest.mark.parametrize("kept", [3, 0])
