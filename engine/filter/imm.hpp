@@ -57,6 +57,13 @@ struct Prediction {
   // Writes log(w_m N(y; ŷ_m, S_m)) of every mode to `each` and returns the log of their sum.
   double log_likelihood(const Point& point, std::array<double, kMaxModes>& each) const;
 
+  // Variance of a coordinate, the mean over the axes.
+  double variance() const {
+    double sum = 0;
+    for (int b = 0; b < M; ++b) sum += w[b] * (S[b] + squared_distance(y[b], center, D) / D);
+    return sum;
+  }
+
   // Radius of a ball about `center` that contains every point whose χ² is at most `gate` in some
   // mode and whose log likelihood can exceed `min_log_likelihood`; negative if there are none.
   // Points may have additional measurement variance up to `max_r`.

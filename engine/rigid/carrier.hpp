@@ -210,6 +210,8 @@ class RigidCarrier {
   // occluded since.
   bool carry(std::int32_t marker, const Places& now, Carriage& out, std::int64_t n_open = 0);
 
+  // All distances known of a marker.
+  std::span<const Bond> known(std::int32_t marker) const { return carrier_.neighbours(marker); }
   // The bonds of a marker, by increasing predictive variance.
   std::span<const Bond> bonds(std::int32_t marker);
   // The number of bonds of a marker to markers of larger number, so that each pair is counted once.

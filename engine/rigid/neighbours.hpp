@@ -92,7 +92,7 @@ void keep_smallest(std::vector<T>& all, std::size_t n_max, const T& one) {
     if (!(one < all.back())) return;
     all.pop_back();
   }
-  all.insert(std::ranges::upper_bound(all, one), one);
+  all.insert(std::upper_bound(all.begin(), all.end(), one), one);
 }
 
 class Neighbours {

@@ -27,6 +27,7 @@
 #include "base/scratch.hpp"
 #include "rigid/carried_state.hpp"
 #include "rigid/carrier.hpp"
+#include "rigid/joint_places.hpp"
 #include "tracks/live_tracks.hpp"
 
 namespace asterism {
@@ -57,7 +58,9 @@ class CarriedTracks {
     };
     if (!opt_.is_on) return list([](std::size_t) { return true; }, out);
     list([&](std::size_t i) { return live[i].gap == 0; }, out);
-    fix_positions(live, points, out);
+    s_.all = out;
+    list([&](std::size_t i) { return live[i].gap > 0; }, s_.all);
+    fix_positions(live, points);
     predict_occluded(live, n_open);
     s_.alone.clear();
     list([&](std::size_t i) { return s_.is_carried[i] != 0; }, s_.alone);
@@ -131,34 +134,33 @@ class CarriedTracks {
   // A position is uncertain if its standard deviation exceeds this fraction of the distance to the
   // nearest neighbour.
   static constexpr double kUncertain = 0.25;
-  static constexpr std::size_t kFew = 3;  // bonds
 
   template <typename More>
   static std::int32_t number(const LiveTrack<More>& track) {
     return static_cast<std::int32_t>(track.id);
   }
 
-  // Fixes the positions of tracks and detections that are each other's best candidate.
-  void fix_positions(const LiveTracks<>& live, std::span<const Point> points,
-                  std::span<const Candidate> candidates) {
-    s_.best_row.assign(points.size(), -1);
-    s_.best_column.assign(live.size(), -1);
-    const auto better = [&](std::int32_t e, std::int32_t than) {
-      return than < 0 || candidates[e].gain > candidates[than].gain;
-    };
-    for (std::int32_t e = 0; e < static_cast<std::int32_t>(candidates.size()); ++e) {
-      const Candidate& c = candidates[e];
-      if (!live[c.row].is_confirmed()) continue;
-      if (better(e, s_.best_row[c.column])) s_.best_row[c.column] = e;
-      if (better(e, s_.best_column[c.row])) s_.best_column[c.row] = e;
+  // Decides jointly where the confirmed tracks are.
+  void fix_positions(const LiveTracks<>& live, std::span<const Point> points) {
+    s_.tracks.clear();
+    for (std::size_t i = 0; i < live.size(); ++i) {
+      if (!live[i].is_confirmed()) continue;
+      const Prediction& prediction = live.prediction(i);
+      s_.tracks.push_back({static_cast<std::int32_t>(i), number(live[i]), prediction.center,
+                           prediction.variance()});
     }
+    s_.joint.begin(s_.tracks, live.size(), carrier_.n_axes(),
+                   [&](std::int32_t marker) { return carrier_.known(marker); });
+    std::erase_if(s_.all, [&](const Candidate& c) { return !live[c.row].is_confirmed(); });
+    std::ranges::stable_sort(s_.all, {}, &Candidate::row);
+    s_.joint.decide(points, s_.all);
     s_.places.clear();
     s_.owner.assign(points.size(), -1);
     for (std::size_t i = 0; i < live.size(); ++i) {
-      const std::int32_t e = s_.best_column[i];
-      if (e < 0 || s_.best_row[candidates[e].column] != e) continue;
-      s_.places.set(number(live[i]), points[candidates[e].column]);
-      s_.owner[candidates[e].column] = static_cast<std::int32_t>(i);
+      const Point* place = s_.joint.place(i);
+      if (place == nullptr) continue;
+      s_.places.set(number(live[i]), *place);
+      if (live[i].gap == 0) s_.owner[place - points.data()] = static_cast<std::int32_t>(i);
     }
   }
 
@@ -224,13 +226,11 @@ class CarriedTracks {
              c.gain - opt_.bond_weight <= min_gain;
     };
     s_.bond_gains.clear();
-    std::int32_t row = -1;
     for (Candidate& c : out) {
       if (!live[c.row].is_confirmed()) continue;
       const bool was_listed = c.gain > min_gain;
       if (opt_.bond_weight > 0 && is_ambiguous(c)) {
-        if (row != c.row) list_detected_bonds(live[row = c.row]);
-        s_.bond_gains.push_back({c.row, c.column, bond_gain(points, c)});
+        s_.bond_gains.push_back({c.row, c.column, s_.joint.gain(c.row, points[c.column])});
         c.gain += s_.bond_gains.back().nats;
       }
       if (is_carried(c.row) && (!(c.gain > s_.ghosts[c.row]) || !may_take(live, c))) c.gain = kNever;
@@ -260,26 +260,6 @@ class CarriedTracks {
       if (s_.replaced_by[c.row] >= 0) c.gain = kNever;
   }
 
-  void list_detected_bonds(const LiveTrack<>& track) {
-    s_.bonds.clear();
-    for (const Bond& bond : carrier_.bonds(number(track))) {
-      if (s_.places.find(bond.other) == nullptr) continue;
-      s_.bonds.push_back(bond);
-      if (s_.bonds.size() == kSteadiest) break;
-    }
-  }
-  // Contribution of bonds, bounded by ± the weight. With fewer than kFew bonds it is smaller.
-  double bond_gain(std::span<const Point> points, const Candidate& c) const {
-    double sum = 0;
-    for (const Bond& bond : s_.bonds) {
-      const Point& other = *s_.places.find(bond.other);
-      const double distance2 = squared_distance(points[c.column], other, carrier_.n_axes());
-      if (distance2 > 0)  // two markers cannot coincide
-        sum += agreement(bond, carrier_.noise(), std::sqrt(distance2));
-    }
-    return sum * opt_.bond_weight / static_cast<double>(std::max(kFew, s_.bonds.size()));
-  }
-
   // Counts detections that an occluded track would have taken by its own prediction.
   void count_refused(double min_gain, std::span<const Candidate> out, FrameStats& stats) const {
     for (const Candidate& own : s_.alone)
@@ -293,9 +273,10 @@ class CarriedTracks {
     std::vector<MotionState> fused;
     std::vector<Prediction> own;
     std::vector<double> ghosts;  // log(1 + density of ghosts / density of clutter), by track
-    std::vector<std::int32_t> best_row, best_column, owner, replaced_by, n_rows, n_columns;
-    std::vector<Candidate> alone, added;
-    std::vector<Bond> bonds;
+    std::vector<std::int32_t> owner, replaced_by, n_rows, n_columns;
+    std::vector<Candidate> all, alone, added;
+    std::vector<JointPlaces::Track> tracks;
+    JointPlaces joint;
     std::vector<MarkerPoint> seen;
     std::vector<std::int32_t> known;
     Places places;
