@@ -41,7 +41,7 @@ from asterism.tracking.estimation.motion_fit import (
 )
 from asterism.tracking.estimation.rates import Counts, Rates
 from asterism.tracking.estimation.sampling import Runs, sample_runs
-from asterism.tracking.estimation.scales import first_scales
+from asterism.tracking.estimation.scales import first_scales, quantile
 from asterism.tracking.estimation.stochastic_em import draw_rates
 
 if TYPE_CHECKING:
@@ -226,7 +226,7 @@ def _check_units(detections: Detections) -> None:
     """Log a warning if a tenth of the points is too far from the centre for metres."""
     points = detections.points[:: 1 + detections.n_points // COUNT_POINTS]
     spread = np.abs(points - np.median(points, axis=0)).max(axis=1)
-    far = float(np.quantile(spread, 0.9))
+    far = quantile(spread, 0.9)
     if far > MAX_EXTENT:
         log.warning(
             "a tenth of the points is more than %.3g m from their median: "
