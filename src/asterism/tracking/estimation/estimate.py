@@ -65,6 +65,9 @@ MIN_NOISE = 2e-4
 """Lower bound of the noise, metres. Smoothed captures show less noise, but their residual
 accelerations are not white, and a filter with less noise loses tracks. Association does not depend
 on a fifth of a millimetre, unless a hundredth of the points' spacing is smaller."""
+NEGLIGIBLE = 10.0
+"""Ratio of `MIN_NOISE` to the lower bound of the noise in fits of several motions. Captures without
+noise are tracked as well as with a lower bound, and the search for less noise takes many steps."""
 SAFE_SHARE = 1 / 6
 """Largest displacement of a marker by one σ of a jolt in a frame, as a share of the spacing."""
 BLIND = 1.1
@@ -175,8 +178,9 @@ def _fitted(
     """Fit one motion and three motions, and return the better fit with its tracks and bounds."""
     reach = scales.spacing / 2
     low, high = scales.acceleration_low, scales.acceleration_high
+    min_noise = max(scales.noise_floor, min(MIN_NOISE, scales.spacing / 100))
     bounds = FitBounds(
-        min_noise=scales.noise_floor,
+        min_noise=max(scales.noise_floor, min_noise / NEGLIGIBLE),
         max_acceleration=2 * SAFE_SHARE * scales.spacing / scales.step**2,
     )
     levels = (low, math.sqrt(low * high), high)
@@ -187,7 +191,6 @@ def _fitted(
     model = _model(fit, rates_of(evidence), evidence, scales, region)
     evidence = gather_evidence(runs, _wider(model), reach)
     fit = fit_motion(evidence.tracks, model, fit, bounds, refine=True)
-    min_noise = max(scales.noise_floor, min(MIN_NOISE, scales.spacing / 100))
     bounds = replace(bounds, min_noise=min_noise)
 
     def tracked(trial: MotionFit, evidence: Evidence) -> tuple[Evidence, TrackingModel]:
