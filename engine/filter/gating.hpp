@@ -58,8 +58,12 @@ class PointGrid {
     for (std::int64_t c = 0; c < n_cells; ++c) starts_[c + 1] += starts_[c];
     fill_.assign(starts_.begin(), starts_.end() - 1);
     order_.resize(points.size());
-    for (std::size_t i = 0; i < points.size(); ++i)
-      order_[fill_[cell_of_[i]]++] = static_cast<std::int32_t>(i);
+    sorted_.resize(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const std::int32_t slot = fill_[cell_of_[i]]++;
+      order_[slot] = static_cast<std::int32_t>(i);
+      sorted_[slot] = points[i];
+    }
   }
 
   // The largest measurement variance of a point in addition to that of the sensor.
@@ -72,7 +76,7 @@ class PointGrid {
     const double radius2 = radius * radius;
     if (!is_grid_) {
       for (std::size_t i = 0; i < points_.size(); ++i) {
-        const double d2 = squared_distance(points_[i], center, D_);
+        const double d2 = squared_distance(points_[i], center);
         if (d2 <= radius2) visit(static_cast<std::int32_t>(i), d2);
       }
       return;
@@ -87,9 +91,8 @@ class PointGrid {
         // Cells along the last axis are contiguous in memory.
         const std::int64_t row = (a * size_[1] + b) * size_[2];
         for (std::int32_t k = starts_[row + from[2]]; k < starts_[row + to[2] + 1]; ++k) {
-          const std::int32_t i = order_[k];
-          const double d2 = squared_distance(points_[i], center, D_);
-          if (d2 <= radius2) visit(i, d2);
+          const double d2 = squared_distance(sorted_[k], center);
+          if (d2 <= radius2) visit(order_[k], d2);
         }
       }
   }
@@ -113,6 +116,7 @@ class PointGrid {
   Point low_{}, inverse_{};
   std::array<std::int64_t, kMaxAxes> size_{1, 1, 1};
   std::vector<std::int32_t> starts_, fill_, order_;
+  std::vector<Point> sorted_;  // by cell, as `order_`
   std::vector<std::int64_t> cell_of_;
 };
 

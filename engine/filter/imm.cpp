@@ -7,6 +7,7 @@
 #include <type_traits>
 
 #include "filter/axis_kernels.hpp"
+#include "filter/mode_lanes.hpp"
 
 namespace asterism {
 
@@ -15,6 +16,7 @@ std::array<double, kMaxModes> stationary(std::array<double, kMaxModes * kMaxMode
   std::array<double, kMaxModes> w{};
   for (int i = 0; i < 40; ++i) {
     std::array<double, kMaxModes * kMaxModes> next{};
+    const auto before = T;
     for (int a = 0; a < M; ++a)
       for (int c = 0; c < M; ++c)
         for (int b = 0; b < M; ++b) next[a * M + b] += T[a * M + c] * T[c * M + b];
@@ -23,6 +25,7 @@ std::array<double, kMaxModes> stationary(std::array<double, kMaxModes * kMaxMode
       for (int b = 0; b < M; ++b) sum += next[a * M + b];
       for (int b = 0; b < M; ++b) T[a * M + b] = next[a * M + b] / sum;
     }
+    if (T == before) break;  // further squaring would change nothing
   }
   for (int a = 0; a < M; ++a)
     for (int b = 0; b < M; ++b) w[b] += T[a * M + b] / M;
@@ -49,7 +52,7 @@ using Deviation = std::array<Row<n>, kMaxAxes>;
 
 // Mean over the axes of e eᵀ.
 template <int n>
-inline std::array<Row<n>, n> mean_square(const Deviation<n>& e, int D) {
+ASTERISM_INLINED std::array<Row<n>, n> mean_square(const Deviation<n>& e, int D) {
   std::array<Row<n>, n> E;
   for (int i = 0; i < n; ++i) {
     E[i] = e[0][i] * e[0];
@@ -65,7 +68,7 @@ struct ModeSpread {
   std::array<Deviation<n>, M> e;
   std::array<std::array<Row<n>, n>, M> PE;  // P_a + E_a; of mode 0, P_0
 
-  ModeSpread(const MotionState& s, int D) {
+  ASTERISM_INLINED ModeSpread(const MotionState& s, int D) {
     const AxisRows<n> own = AxisRows<n>::of(s.mode[0]);
     first = own.x;
     PE[0] = own.P;
@@ -77,36 +80,60 @@ struct ModeSpread {
     }
   }
 
-  // Mean and covariance of a mixture of the modes, with weights that sum to 1.
-  AxisRows<n> mix(const std::array<double, kMaxModes>& weights, int D) const {
-    AxisRows<n> out;
-    Deviation<n> shift;
-    for (int i = 0; i < n; ++i) out.P[i] = weights[0] * PE[0][i];
-    for (int a = 1; a < M; ++a) {
-      for (int d = 0; d < kMaxAxes; ++d)
-        shift[d] = a == 1 ? weights[a] * e[a][d] : shift[d] + weights[a] * e[a][d];
-      for (int i = 0; i < n; ++i) out.P[i] = out.P[i] + weights[a] * PE[a][i];
-    }
-    for (int d = 0; d < kMaxAxes; ++d) out.x[d] = first[d] + shift[d];
-    const std::array<Row<n>, n> moved = mean_square<n>(shift, D);
-    for (int i = 0; i < n; ++i) out.P[i] = out.P[i] - moved[i];
+  // Mean and covariance of mixtures of the modes, one in each lane. The weights of each sum to 1.
+  ASTERISM_INLINED ModeLanes<n, M> mix(const std::array<Lanes, M>& weights, int D) const {
+    ModeLanes<n, M> out;
+    std::array<std::array<Lanes, n>, kMaxAxes> shift;
+    for (int d = 0; d < kMaxAxes; ++d)
+      for (int i = 0; i < n; ++i) {
+        shift[d][i] = weights[1] * e[1][d][i];
+        for (int a = 2; a < M; ++a) shift[d][i] = shift[d][i] + weights[a] * e[a][d][i];
+        out.x[d][i] = Lanes(first[d][i]) + shift[d][i];
+      }
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j) {
+        Lanes P = weights[0] * PE[0][i][j], moved = shift[0][i] * shift[0][j];
+        for (int a = 1; a < M; ++a) P = P + weights[a] * PE[a][i][j];
+        for (int d = 1; d < kMaxAxes; ++d) moved = moved + shift[d][i] * shift[d][j];
+        out.P[i][j] = P - moved / Lanes(D);
+      }
     return out;
   }
 };
 
 template <int n, int M>
-inline void predict_modes(const MotionModel& m, const MotionStep& step, MotionState& s) {
-  const ModeSpread<n, M> spread(s, m.axis.D);
-  const std::array<double, kMaxModes> before = s.w;
-  for (int b = 0; b < M; ++b) {
-    std::array<double, kMaxModes> share{};
-    double total = 0;
-    for (int a = 0; a < M; ++a) total += share[a] = before[a] * m.T[a * M + b];
-    for (int a = 0; a < M; ++a) share[a] /= total;
-    s.w[b] = total;
-    predict_axis<n>(step.mode[b], spread.mix(share, m.axis.D), s.mode[b]);
+ASTERISM_INLINED void predict_modes(const MotionModel& m, const MotionStep& step, MotionState& s) {
+  std::array<Lanes, M> share;  // of mode a in each new mode
+  Lanes total;
+  for (int a = 0; a < M; ++a) {
+    share[a] = s.w[a] * lanes_by_mode<M>([&](int b) { return m.T[a * M + b]; });
+    total = total + share[a];
   }
+  for (int a = 0; a < M; ++a) share[a] = share[a] / total;
+  ModeLanes<n, M> next = ModeSpread<n, M>(s, m.axis.D).mix(share, m.axis.D);
+  next.predict(step);
+  next.write(s);
+  for (int b = 0; b < M; ++b) s.w[b] = total.at[b];
 }
+template <int n, int M>
+ASTERISM_INLINED void update_modes(const AxisModel& m, const Point& y, MotionState& s) {
+  ModeLanes<n, M> modes;
+  modes.read(s);
+  modes.update(m, y);
+  modes.write(s);
+}
+#if defined(__GNUC__) && defined(__x86_64__)
+// The same for processors with registers of four doubles, with the same result.
+template <int n, int M>
+[[gnu::target("avx2")]] void predict_by_four(const MotionModel& m, const MotionStep& step,
+                                             MotionState& s) {
+  predict_modes<n, M>(m, step, s);
+}
+template <int n, int M>
+[[gnu::target("avx2")]] void update_by_four(const AxisModel& m, const Point& y, MotionState& s) {
+  update_modes<n, M>(m, y, s);
+}
+#endif
 
 // Calls f with the number of states and of modes as compile-time constants.
 template <typename F>
@@ -123,17 +150,27 @@ inline void with_modes(const MotionModel& m, F&& f) {
 AxisState collapse(const MotionModel& m, const MotionState& s) {
   AxisState out = s.mode[0];
   with_modes(m, [&](auto n, auto M) {
-    if constexpr (M > 1) ModeSpread<n, M>(s, m.axis.D).mix(s.w, m.axis.D).write(out);
+    if constexpr (M > 1) {
+      std::array<Lanes, M> weights;
+      for (int a = 0; a < M; ++a) weights[a] = s.w[a];
+      MotionState mixed;
+      ModeSpread<n, M>(s, m.axis.D).mix(weights, m.axis.D).write(mixed);
+      out = mixed.mode[0];
+    }
   });
   return out;
 }
 
 void predict(const MotionModel& m, const MotionStep& step, MotionState& s) {
   with_modes(m, [&](auto n, auto M) {
-    if constexpr (M == 1)
+    if constexpr (M == 1) {
       predict_axis<n>(step.mode[0], AxisRows<n>::of(s.mode[0]), s.mode[0]);
-    else
+    } else {
+#if defined(__GNUC__) && defined(__x86_64__)
+      if (__builtin_cpu_supports("avx2")) return predict_by_four<n, M>(m, step, s);
+#endif
       predict_modes<n, M>(m, step, s);
+    }
   });
 }
 
@@ -160,7 +197,7 @@ Prediction::Prediction(const MotionModel& m, const MotionState& s) : M(m.M), D(m
 double Prediction::log_likelihood(const Point& point, std::array<double, kMaxModes>& each) const {
   double best = -std::numeric_limits<double>::infinity();
   for (int b = 0; b < M; ++b) {
-    const double d2 = squared_distance(point, y[b], D);
+    const double d2 = squared_distance(point, y[b]);
     each[b] = log_peak[b] - 0.5 * d2 / S[b];
     if (point.r > 0)
       each[b] = log_peak[b] - 0.5 * (D * std::log1p(point.r / S[b]) + d2 / (S[b] + point.r));
@@ -181,12 +218,13 @@ double Prediction::log_likelihood(const Point& point, std::array<double, kMaxMod
 double Prediction::radius(double gate, double min_log_likelihood, double max_r) const {
   // The mode that gates a point and the mode that makes it likely may differ.
   double gated = -1, likely = -1;
+  const double log_modes = std::log(static_cast<double>(M));
   for (int b = 0; b < M; ++b) {
-    const double offset = std::sqrt(squared_distance(y[b], center, D));
+    const double offset = std::sqrt(squared_distance(y[b], center));
     const auto reach = [&](double x2) { return offset + std::sqrt(x2 * (S[b] + max_r)); };
     gated = std::max(gated, reach(gate));
     // The largest of M summands is at least their sum divided by M.
-    const double chi2 = 2 * (log_peak[b] + std::log(static_cast<double>(M)) - min_log_likelihood);
+    const double chi2 = 2 * (log_peak[b] + log_modes - min_log_likelihood);
     if (chi2 > 0) likely = std::max(likely, reach(chi2));
   }
   return std::min(gated, likely);
@@ -201,8 +239,15 @@ double update(const MotionModel& m, const Prediction& p, const Point& y, MotionS
 
 void update(const MotionModel& m, const std::array<double, kMaxModes>& each,
             double log_likelihood, const Point& y, MotionState& s) {
-  with_states(m.axis.n, [&](auto n) {
-    for (int b = 0; b < m.M; ++b) update_axis_with<n>(m.axis, y, s.mode[b]);
+  with_modes(m, [&](auto n, auto M) {
+    if constexpr (M == 1) {
+      update_axis_with<n>(m.axis, y, s.mode[0]);
+    } else {
+#if defined(__GNUC__) && defined(__x86_64__)
+      if (__builtin_cpu_supports("avx2")) return update_by_four<n, M>(m.axis, y, s);
+#endif
+      update_modes<n, M>(m.axis, y, s);
+    }
   });
   if (m.M == 1) return;
   for (int b = 0; b < m.M; ++b) {

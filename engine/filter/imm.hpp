@@ -71,7 +71,7 @@ struct Prediction {
 
   bool is_gated(const Point& point, double gate) const {
     for (int b = 0; b < M; ++b)
-      if (squared_distance(point, y[b], D) <= gate * (S[b] + point.r)) return true;
+      if (squared_distance(point, y[b]) <= gate * (S[b] + point.r)) return true;
     return false;
   }
 };

@@ -59,9 +59,9 @@ inline std::vector<double> log_end_table(const ScoreModel& m, std::int64_t n_fra
   return table;
 }
 
-inline bool is_reachable(const ScoreModel& m, const Point& a, const Point& b, double dt, int D) {
+inline bool is_reachable(const ScoreModel& m, const Point& a, const Point& b, double dt) {
   const double reach = m.max_speed * dt + m.speed_margin;
-  return squared_distance(a, b, D) <= reach * reach;
+  return squared_distance(a, b) <= reach * reach;
 }
 
 // s(τ) of a track, or -inf for a track outside the space Ω. `points` and `frames` are those of the
@@ -77,7 +77,7 @@ inline double score_track(const MotionModel& m, const ScoreModel& sm, const Time
   for (std::int64_t i = 1; i < n; ++i) {
     const std::int64_t gap = frames[i] - frames[i - 1];
     const double dt = line.times[frames[i]] - line.times[frames[i - 1]];
-    if (gap > sm.max_gap || !is_reachable(sm, points[i - 1], points[i], dt, m.axis.D)) return impossible;
+    if (gap > sm.max_gap || !is_reachable(sm, points[i - 1], points[i], dt)) return impossible;
     for (std::int64_t t = frames[i - 1] + 1; t <= frames[i]; ++t) predict(m, line.step(t), state);
     s += sm.log_misses(0, gap - 1) + sm.log_hit(gap - 1) + gap * sm.log_survive +
          update(m, Prediction(m, state), points[i], state);

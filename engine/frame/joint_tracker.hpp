@@ -75,8 +75,9 @@ class JointTracker {
     s_.free.assign(points.size(), 1);
     share_among_confirmed(points, stats);
     share_among_tentative(points, stats);
+    const double p_clutter = 1 - p_new(1);
     for (std::size_t j = 0; j < points.size(); ++j)
-      label(live_.so_far.n_seen + static_cast<std::int64_t>(j), -1, s_.free[j] * (1 - p_new(1)));
+      label(live_.so_far.n_seen + static_cast<std::int64_t>(j), -1, s_.free[j] * p_clutter);
     update_tracks(time, points, stats, label);
     begin_tracks(time, points);
     carried_.learn(live_, stats);
@@ -96,6 +97,7 @@ class JointTracker {
  private:
   struct Memory {
     std::vector<Candidate> candidates, eligible;
+    std::vector<double> offsets;  // gain of a pairing minus its log likelihood, by track
     std::vector<double> gains, marginals, log_miss, all_missed;
     std::vector<std::int32_t> best;  // by track
     std::vector<double> match_probability, missed;
@@ -152,13 +154,15 @@ class JointTracker {
   void find_candidates(double time, const MotionStep& step, std::span<const Point> points,
                        JointStats& stats) {
     const double common = -live_.sm.log_clutter - live_.leftover_gain();
-    const auto offset = [&](std::size_t i) {
-      return common + std::log(p_detect(i)) - softplus(-existence(i)) -
-             std::log(p_undetected(i, existence(i)));
+    s_.offsets.clear();
+    for (std::size_t i = 0; i < live_.size(); ++i)
+      s_.offsets.push_back(common + std::log(p_detect(i)) - softplus(-existence(i)) -
+                           std::log(p_undetected(i, existence(i))));
+    const auto min_log_likelihood_of = [&](std::size_t i, double gain) {
+      return gain - s_.offsets[i];
     };
-    const auto min_log_likelihood_of = [&](std::size_t i, double gain) { return gain - offset(i); };
     const auto gain_of = [&](std::size_t i, double log_likelihood) {
-      return offset(i) + log_likelihood;
+      return s_.offsets[i] + log_likelihood;
     };
     carried_.list(live_, time, step, points, kNegligible, min_log_likelihood_of, gain_of,
                   s_.candidates, stats);

@@ -175,7 +175,7 @@ class LookAhead {
     grids_[f].within(prediction.center, radius, [&](std::int32_t j, double distance2) {
       const Point& y = frames_[f].points[j];
       if (squared_distance(region.center, y, m_.axis.D) > radius2) return;
-      if (!is_reachable(gains_.sm, last, y, dt, m_.axis.D)) return;
+      if (!is_reachable(gains_.sm, last, y, dt)) return;
       if (!prediction.is_gated(y, gate_)) return;
       const double log_likelihood = prediction.log_likelihood(y, each);
       if (log_likelihood >= least) visit(j, distance2, log_likelihood, each);

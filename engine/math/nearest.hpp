@@ -25,28 +25,38 @@ class NearestInFrame {
   // Frame t has the points from offsets[t] to offsets[t + 1]. Both spans must outlive the object.
   NearestInFrame(std::span<const Point> points, std::span<const std::int64_t> offsets, int D)
       : points_(points), offsets_(offsets), D_(D), order_(points.size()),
-        axis_(offsets.size() - 1, kUnsorted) {}
+        axis_(offsets.size() - 1, kUnsorted) {
+    for (std::vector<double>& x : sorted_) x.resize(points.size() + kBlock);
+  }
 
   Two of(const Point& q, std::int64_t frame) {
     if (axis_[frame] == kUnsorted) sort(frame);  // often few of the frames are asked for
     const int d = axis_[frame];
-    const auto first = order_.begin() + offsets_[frame], last = order_.begin() + offsets_[frame + 1];
-    auto right = std::partition_point(first, last,
-                                      [&](std::int64_t i) { return points_[i][d] < q[d]; });
-    auto left = right;
+    const double* along = sorted_[d].data();
+    const std::int64_t first = offsets_[frame], last = offsets_[frame + 1];
+    std::int64_t right = std::lower_bound(along + first, along + last, q[d]) - along, left = right;
     Two found;
     while (left != first || right != last) {
       // The side whose next point is nearer along the axis.
-      const double low = left == first ? kFar : q[d] - points_[left[-1]][d];
-      const double high = right == last ? kFar : points_[*right][d] - q[d];
-      const double along = std::min(low, high);
-      if (along * along > found.distance2[1]) break;
-      consider(low < high ? *--left : *right++, q, found);
+      const double low = left == first ? kFar : q[d] - along[left - 1];
+      const double high = right == last ? kFar : along[right] - q[d];
+      const double nearest = std::min(low, high);
+      if (nearest * nearest > found.distance2[1]) break;
+      if (low < high) {
+        const std::int64_t n = std::min(kBlock, left - first);
+        left -= n;
+        consider(left, n, q, found);
+      } else {
+        const std::int64_t n = std::min(kBlock, last - right);
+        consider(right, n, q, found);
+        right += n;
+      }
     }
     return found;
   }
 
  private:
+  static constexpr std::int64_t kBlock = 4;  // points whose distances are computed together
   static constexpr double kFar = std::numeric_limits<double>::infinity();
   static constexpr std::int8_t kUnsorted = -1;
 
@@ -57,6 +67,8 @@ class NearestInFrame {
     std::sort(first, last, [&](std::int64_t a, std::int64_t b) {
       return points_[a][d] != points_[b][d] ? points_[a][d] < points_[b][d] : a < b;
     });
+    for (std::int64_t k = offsets_[frame]; k < offsets_[frame + 1]; ++k)
+      for (int e = 0; e < kMaxAxes; ++e) sorted_[e][k] = points_[order_[k]][e];
     axis_[frame] = static_cast<std::int8_t>(d);
   }
   // The axis with the largest mean deviation from the mean, which few false alarms hardly change.
@@ -75,17 +87,29 @@ class NearestInFrame {
     return widest;
   }
 
-  // Of equally near points the first in the frame counts as nearer.
-  void consider(std::int64_t i, const Point& q, Two& found) const {
-    const double d2 = squared_distance(points_[i], q, D_);
-    const auto is_nearer = [&](int k) {
-      return d2 < found.distance2[k] || (d2 == found.distance2[k] && i < found.index[k]);
-    };
-    if (is_nearer(0)) {
-      found = {{i, found.index[0]}, {d2, found.distance2[0]}};
-    } else if (is_nearer(1)) {
-      found.index[1] = i;
-      found.distance2[1] = d2;
+  // Considers n sorted points, at most kBlock. Of equally near points the first in the frame counts
+  // as nearer.
+  void consider(std::int64_t begin, std::int64_t n, const Point& q, Two& found) const {
+    std::array<double, kBlock> distance2;  // also of the points after the n, which are not used
+    for (std::int64_t k = 0; k < kBlock; ++k) {
+      const double x = sorted_[0][begin + k] - q[0], y = sorted_[1][begin + k] - q[1],
+                   z = sorted_[2][begin + k] - q[2];
+      distance2[k] = x * x + y * y + z * z;
+    }
+    // Most blocks contain no nearer point, so one branch for a block is predicted well.
+    if (std::ranges::min(distance2) > found.distance2[1]) return;
+    for (std::int64_t k = 0; k < n; ++k) {
+      const std::int64_t i = order_[begin + k];
+      const auto is_nearer = [&](int rank) {
+        return distance2[k] < found.distance2[rank] ||
+               (distance2[k] == found.distance2[rank] && i < found.index[rank]);
+      };
+      if (is_nearer(0)) {
+        found = {{i, found.index[0]}, {distance2[k], found.distance2[0]}};
+      } else if (is_nearer(1)) {
+        found.index[1] = i;
+        found.distance2[1] = distance2[k];
+      }
     }
   }
 
@@ -93,6 +117,7 @@ class NearestInFrame {
   std::span<const std::int64_t> offsets_;
   int D_;
   std::vector<std::int64_t> order_;  // the points of each sorted frame along its axis
+  std::array<std::vector<double>, kMaxAxes> sorted_;  // their coordinates, by axis, and a block more
   std::vector<std::int8_t> axis_;
 };
 

@@ -123,13 +123,10 @@ class RigidNeighbours {
         carrier_.remember(k, places(s, then), then, anchors);
     marker.anchors = SharedCopy<std::vector<Anchor>>(std::move(anchors));
   }
-  // Predicts the occluded marker k in the newest frame if a tracklet of so many detections, the last
-  // of them there, will be compared with it by this one when it is decided after `confirm` frames.
-  // This spreads the work of a decision over the frames before.
-  void prepare(const StitchMemory& s, std::int32_t n, std::int64_t confirm, std::int32_t k,
-               const Marker& marker) {
-    if ((n - 1) % interval(static_cast<std::size_t>(confirm)) == 0)
-      carry(s, k, *marker.anchors, s.frames.now());
+  // Predicts the occluded marker k in the newest frame, because an undecided tracklet there may be
+  // compared with it later. The frame of a decision would otherwise predict it in many frames.
+  void prepare(const StitchMemory& s, std::int32_t k, const Marker& marker) {
+    carry(s, k, *marker.anchors, s.frames.now());
   }
   // Log-likelihood ratio for a tracklet to be the occluded marker k, predicted by the neighbours of
   // k. For each anchor, it is averaged over some detections of the tracklet, without the worst,

@@ -128,7 +128,7 @@ class Stitcher {
         prepare_all();
         break;
       }
-    assignment_.guess(so_far_, markers_, neighbours_, opt_.confirm,
+    assignment_.guess(so_far_, markers_, neighbours_,
                       [this](const Tracklet& f) { return is_short(f); });
   }
   // Decides the remaining tracklets after the last frame.

@@ -83,7 +83,7 @@ class TrackletAssignment {
   // its number of detections has doubled.
   template <typename IsShort>
   void guess(StitchMemory& s, const Markers& markers, RigidNeighbours& neighbours,
-             std::int64_t confirm, IsShort&& is_short) {
+             IsShort&& is_short) {
     w_.open.clear();
     w_.candidates.clear();
     for (auto& [id, f] : s.tracklets) {
@@ -97,7 +97,7 @@ class TrackletAssignment {
             guesses.emplace_back(k, gain);
       } else if (f.last == s.frames.now()) {
         for (const auto& [k, marker] : markers)
-          if (may_be(f, marker)) neighbours.prepare(s, f.n, confirm, k, marker);
+          if (may_be(f, marker)) neighbours.prepare(s, k, marker);
       }
       const auto row = static_cast<std::int32_t>(w_.open.size());
       w_.open.push_back(id);

@@ -202,17 +202,17 @@ class LiveTracks {
                    Visit&& visit) const {
     if (radius < 0) return;
     grid.within(prediction.center, radius, [&](std::int32_t j, double distance2) {
-      if (is_reachable(sm, last, points[j], dt, m.axis.D) &&
+      if (is_reachable(sm, last, points[j], dt) &&
           prediction.is_gated(points[j], opt.gate))
         visit(j, distance2);
     });
   }
 
   void predict_all(const MotionStep& step) {
-    s_.predictions.resize(tracks.size());
-    for (std::size_t i = 0; i < tracks.size(); ++i) {
-      predict(m, step, tracks[i].state);
-      s_.predictions[i] = Prediction(m, tracks[i].state);
+    s_.predictions.clear();
+    for (Track& track : tracks) {
+      predict(m, step, track.state);
+      s_.predictions.emplace_back(m, track.state);
     }
   }
 

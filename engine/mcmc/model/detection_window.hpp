@@ -67,7 +67,7 @@ class DetectionWindow {
   bool is_linkable(std::int32_t i, std::int32_t j) const {
     const Detection &a = detections_[i], &b = detections_[j];
     const std::int64_t gap = b.frame - a.frame;
-    return gap >= 1 && gap <= sm_.max_gap && a.frame <= last_open_ && is_near(a, b);
+    return gap >= 1 && gap <= sm_.max_gap && a.frame <= last_open_ && is_reachable(sm_, a.y, b.y, b.time - a.time);
   }
 
   // Calls visit(j) for every detection of a frame that may follow i.
@@ -82,7 +82,7 @@ class DetectionWindow {
       return;
     }
     for (const std::int32_t j : later.ids)
-      if (squared_distance(a.y, detections_[j].y, m_.axis.D) <= reach * reach) visit(j);
+      if (squared_distance(a.y, detections_[j].y) <= reach * reach) visit(j);
   }
 
   // Adds the next frame. Returns the numbers of its detections in order of arrival.
@@ -148,11 +148,6 @@ class DetectionWindow {
   }
 
  private:
-  // As is_reachable, without a loop of unknown length: the coordinates beyond the axes are 0.
-  bool is_near(const Detection& a, const Detection& b) const {
-    const double reach = sm_.max_speed * (b.time - a.time) + sm_.speed_margin;
-    return squared_distance(a.y, b.y, kMaxAxes) <= reach * reach;
-  }
   // A covariance is at least that of a state which was known exactly before the last step, or before
   // the last two with a detection between them. It is at least the smallest of the modes if they
   // are mixed.

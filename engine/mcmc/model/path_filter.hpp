@@ -93,7 +93,7 @@ class OneMotion {
     return half < 0 ? -1 : std::sqrt(2 * (e.S + max_r) * half);
   }
   static double log_likelihood(const MotionModel& m, const Expected& e, const Point& y) {
-    const double d2 = squared_distance(y, e.center, m.axis.D);
+    const double d2 = squared_distance(y, e.center);
     if (y.r > 0)
       return e.log_peak - 0.5 * (m.axis.D * std::log1p(y.r / e.S) + d2 / (e.S + y.r));
     return e.log_peak - 0.5 * d2 / e.S;

@@ -257,9 +257,10 @@ class McmcTracker {
     shares_.resize(window.n_ids());
     for (std::int64_t t = oldest_open(); t <= window.now(); ++t)
       for (const std::int32_t i : window.frame(t).ids) {
-        const std::int32_t before = p.track_of(i) < 0 ? -2 : p.before(i);
+        const std::int32_t k = p.track_of(i), before = k < 0 ? -2 : p.before(i);
         Share& kept = shares_[i];
-        if (before >= 0 && p.is_frozen(before) && kept.before == before) continue;
+        const bool is_settled = before >= 0 && p.place_of(i) <= p.track(k).n_frozen;
+        if (is_settled && kept.before == before) continue;
         if (kept.before != before) kept = {0, 0, before};
         kept.sum += now[i];
         ++kept.n;

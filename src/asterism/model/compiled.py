@@ -105,8 +105,8 @@ def steps_of(
         return np.zeros(len(times), np.int32), still[None], quiet[None]
     spacing = _to_nanosecond(np.diff(times))
     if (spacing == spacing[0]).all():  # as in most captures, and faster than sorting
-        F, Q = _of_modes(motion, spacing[:1])
-        return np.zeros(len(times), np.int32), F, Q
+        F, Q = transition(motion, float(spacing[0]))
+        return np.zeros(len(times), np.int32), F[None], Q[None]
     spacing, kind = np.unique(spacing, return_inverse=True)
     F, Q = _of_modes(motion, spacing)
     return np.concatenate([[0], kind]).astype(np.int32), F, Q

@@ -41,7 +41,7 @@ from asterism.tracking.estimation.motion_fit import (
 )
 from asterism.tracking.estimation.rates import Counts, Rates
 from asterism.tracking.estimation.sampling import Runs, sample_runs
-from asterism.tracking.estimation.scales import first_scales
+from asterism.tracking.estimation.scales import first_scales, quantile
 from asterism.tracking.estimation.stochastic_em import draw_rates
 
 if TYPE_CHECKING:
@@ -65,6 +65,9 @@ MIN_NOISE = 2e-4
 """Lower bound of the noise, metres. Smoothed captures show less noise, but their residual
 accelerations are not white, and a filter with less noise loses tracks. Association does not depend
 on a fifth of a millimetre, unless a hundredth of the points' spacing is smaller."""
+NEGLIGIBLE = 10.0
+"""Ratio of `MIN_NOISE` to the lower bound of the noise in fits of several motions. Captures without
+noise are tracked as well as with a lower bound, and the search for less noise takes many steps."""
 SAFE_SHARE = 1 / 6
 """Largest displacement of a marker by one σ of a jolt in a frame, as a share of the spacing."""
 BLIND = 1.1
@@ -175,8 +178,9 @@ def _fitted(
     """Fit one motion and three motions, and return the better fit with its tracks and bounds."""
     reach = scales.spacing / 2
     low, high = scales.acceleration_low, scales.acceleration_high
+    min_noise = max(scales.noise_floor, min(MIN_NOISE, scales.spacing / 100))
     bounds = FitBounds(
-        min_noise=scales.noise_floor,
+        min_noise=max(scales.noise_floor, min_noise / NEGLIGIBLE),
         max_acceleration=2 * SAFE_SHARE * scales.spacing / scales.step**2,
     )
     levels = (low, math.sqrt(low * high), high)
@@ -187,7 +191,6 @@ def _fitted(
     model = _model(fit, rates_of(evidence), evidence, scales, region)
     evidence = gather_evidence(runs, _wider(model), reach)
     fit = fit_motion(evidence.tracks, model, fit, bounds, refine=True)
-    min_noise = max(scales.noise_floor, min(MIN_NOISE, scales.spacing / 100))
     bounds = replace(bounds, min_noise=min_noise)
 
     def tracked(trial: MotionFit, evidence: Evidence) -> tuple[Evidence, TrackingModel]:
@@ -226,7 +229,7 @@ def _check_units(detections: Detections) -> None:
     """Log a warning if a tenth of the points is too far from the centre for metres."""
     points = detections.points[:: 1 + detections.n_points // COUNT_POINTS]
     spread = np.abs(points - np.median(points, axis=0)).max(axis=1)
-    far = float(np.quantile(spread, 0.9))
+    far = quantile(spread, 0.9)
     if far > MAX_EXTENT:
         log.warning(
             "a tenth of the points is more than %.3g m from their median: "

@@ -231,6 +231,9 @@ def _sure_links(
     t = frame[chosen]
     spacing = nearest_two(points, offsets, points[chosen], t)[1][:, 1]
     nearest, distance = nearest_two(points, offsets, points[chosen], t + 1)
-    back = nearest_two(points, offsets, points[nearest[:, 0]], t)[0][:, 0]
-    is_clear = distance[:, 0] < 0.3 * np.minimum(distance[:, 1], spacing)
-    return np.where((back == chosen) & is_clear, nearest[:, 0], -1), spacing, distance[:, 0]
+    clear = np.flatnonzero(distance[:, 0] < 0.3 * np.minimum(distance[:, 1], spacing))
+    next_one = nearest[clear, 0]
+    back = nearest_two(points, offsets, points[next_one], t[clear])[0][:, 0]
+    link = np.full(len(chosen), -1)
+    link[clear] = np.where(back == chosen[clear], next_one, -1)
+    return link, spacing, distance[:, 0]
