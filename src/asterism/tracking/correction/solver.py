@@ -284,24 +284,36 @@ class Solver:
         self.labels = labels
 
     def _chain(self, detection: int, target: int) -> list[int]:
-        """Return the detections without a track that continue one of them by motion."""
-        d, fixed, labels = self._d, self._constraints.clutter, self.labels
+        """Return the detections without a track that continue one of them to a track.
+
+        They fit by motion or, where the track has none, by its distances to other tracks.
+        """
+        d, labels, frame = self._d, self.labels, self._d.frame_of
+        free = labels < 0
+        free[list(self._constraints.clutter)] = False
+        is_known = np.zeros(d.n_frames, dtype=bool)
+        is_known[frame[labels == target]] = True
+        t = int(frame[detection])
+        near = slice(d.offsets[max(t - IDLE, 0)], d.offsets[min(t + IDLE + 1, d.n_frames)])
+        own = np.arange(near.start, near.stop)[free[near] & ~is_known[frame[near]]]
+        odds = np.zeros(len(labels))
+        odds[own] = self.evidence.log_odds(own, labels, target)
         chain = [detection]
         for way in (1, -1):
-            before, head, newest = -1, detection, int(d.frame_of[detection])
+            before, head, newest = -1, detection, int(frame[detection])
             t = newest + way
             while (
                 0 <= t < d.n_frames
-                and abs(t - int(d.frame_of[head])) <= self._motion.max_gap
+                and abs(t - int(frame[head])) <= self._motion.max_gap
                 and abs(t - newest) <= IDLE
             ):
                 own = np.arange(d.offsets[t], d.offsets[t + 1])
-                own = own[(labels[own] < 0) | (labels[own] == target)]
-                own = own[[i not in fixed for i in own.tolist()]] if fixed else own
+                own = own[free[own] | (labels[own] == target)]
                 if len(own):
                     fits = self._motion.continuation(before, head, own)
+                    fits = np.maximum(fits, MIN_FIT) + odds[own]
                     best = int(np.argmax(fits))
-                    if fits[best] >= MIN_FIT:
+                    if fits[best] > MIN_FIT:
                         before, head = head, int(own[best])
                         if labels[head] < 0:
                             chain.append(head)
