@@ -94,8 +94,8 @@ def places_of(tracks: Tracks) -> tuple[Place, ...]:
     tuple of Place
         Identities and names of a probability below `UNCERTAIN`. One place are parts of one track
         that follow each other, parts of two tracks that may be exchanged, and long parts of several
-        tracks at one time, as of a subject that walks out and in again. Parts with less than one
-        expected wrong detection are in the nearest place, and not listed far from every place.
+        tracks at one time, as of a subject that walks out and in again. Joins, and parts with less
+        than one expected wrong detection, are in the nearest place within half a second.
 
     Examples
     --------
