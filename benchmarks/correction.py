@@ -3,9 +3,9 @@
 The corrector goes through what the editor offers, the uncertain identities by falling number of
 expected wrong detections. Where one is wrong it states the marker, which is an action. Where none
 of them is wrong any more, it states the marker of the longest wrong stretch that is left. It has
-one action for three wrong links. The same is done by hand, from the first frame on: each wrong link
-is mended by an exchange of both tracks from there on, a join, a cut, or a track for a stretch of
-detections without one. That is counted up to four times as many actions.
+one action for three wrong links, and 420 at most. The same is done by hand, from the first frame
+on: each wrong link is mended by an exchange of both tracks from there on, a join, a cut, or a track
+for a stretch of detections without one. That is counted up to four times as many actions.
 
 Wrong links are those of the result between detections of different markers, and those of the truth
 that the result lacks (`am.evaluate`). Captures of ``../shared/data`` (or ``--data``), where the
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from asterism.tracking import Change
 
 ENOUGH = 0.999
-LINKS_AN_ACTION = 3
+LINKS_AN_ACTION, MOST_ACTIONS = 3, 420
 ORACLE_GAP = 60
 """Longest gap within a track of the oracle, frames."""
 MIN_EXPECTED = 3.0
@@ -247,7 +247,7 @@ def main() -> None:
             oracle = idf1(am.metrics.oracle_tracks(truth, ORACLE_GAP).labels, truth)
             found = am.evaluate(made.start, truth)
             links = found.wrong_links + found.broken_links
-            limit = links // LINKS_AN_ACTION
+            limit = min(links // LINKS_AN_ACTION, MOST_ACTIONS)
             hand = by_hand(made.start, truth, 4 * limit)
             made.run(limit)
             rows.append(
