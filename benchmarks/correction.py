@@ -2,9 +2,10 @@
 
 The corrector goes through what the editor offers, the uncertain identities by falling number of
 expected wrong detections. Where one is wrong it states the marker, which is an action. Where none
-of them is wrong any more, it states the marker of the longest wrong stretch that is left. The
-same is done by hand, from the first frame on: each wrong link is mended by an exchange of both
-tracks from there on, a join, a cut, or a track for a stretch of detections without one.
+of them is wrong any more, it states the marker of the longest wrong stretch that is left. It has
+one action for three wrong links, and 420 at most. The same is done by hand, from the first frame
+on: each wrong link is mended by an exchange of both tracks from there on, a join, a cut, or a track
+for a stretch of detections without one. That is counted up to four times as many actions.
 
 Wrong links are those of the result between detections of different markers, and those of the truth
 that the result lacks (`am.evaluate`). Captures of ``../shared/data`` (or ``--data``), where the
@@ -40,7 +41,8 @@ if TYPE_CHECKING:
     from asterism.tracking import Change
 
 ENOUGH = 0.999
-ORACLE_GAP = 10
+LINKS_AN_ACTION, MOST_ACTIONS = 3, 420
+ORACLE_GAP = 60
 """Longest gap within a track of the oracle, frames."""
 MIN_EXPECTED = 3.0
 """Expected wrong detections of an identity below which the corrector does not look at it."""
@@ -138,7 +140,8 @@ class Corrector:
         middles = [
             (len(run), int(run[len(run) // 2])) for run in np.split(order, edges) if len(run)
         ]
-        left = [(n, -i) for n, i in middles if i not in self.seen]
+        known = {*self.seen, *self.stated.values()}
+        left = [(n, -i) for n, i in middles if i not in known]
         if not left:
             return False
         middle = -max(left)[1]
@@ -224,7 +227,6 @@ def main() -> None:
     parser.add_argument("--data", type=Path, default=beside)
     parser.add_argument("--only", default="")
     parser.add_argument("--condition", default="")
-    parser.add_argument("--limit", type=int, default=60)
     parser.add_argument("--markdown", type=Path)
     args = parser.parse_args()
     rows: list[list[str]] = []
@@ -245,8 +247,9 @@ def main() -> None:
             oracle = idf1(am.metrics.oracle_tracks(truth, ORACLE_GAP).labels, truth)
             found = am.evaluate(made.start, truth)
             links = found.wrong_links + found.broken_links
-            hand = by_hand(made.start, truth, 4 * args.limit)
-            made.run(args.limit)
+            limit = min(links // LINKS_AN_ACTION, MOST_ACTIONS)
+            hand = by_hand(made.start, truth, 4 * limit)
+            made.run(limit)
             rows.append(
                 [
                     path.stem, name, f"{oracle:.4f}", f"{before:.4f}",

@@ -252,3 +252,22 @@ def test_tracks_that_an_edit_keeps_apart_are_not_joined_as_a_whole():
     ]
     found = am.tracking.correct(tracks, edits, model)
     assert all(holds(edit, found) for edit in edits)
+
+
+def test_one_statement_takes_all_detections_that_keep_the_distances_of_the_track():
+    # The body leaps in each of these frames, so that motion does not tell what comes next.
+    made = am.simulate.person(activity="walk", frames=300, n_markers=40, seed=3)
+    positions, rng = made.positions(), np.random.default_rng(1)
+    positions[140:152] += rng.normal(0, 0.3, (12, 1, 3))
+    truth = am.simulate.corrupt(
+        am.Tracks.from_dense(made.detections.times, positions), clutter=0.2, noise=3e-4, seed=3
+    )
+    d, labels = truth.detections, truth.labels.copy()
+    marker = nearest_pair(truth, 100)[0]
+    own = np.flatnonzero(labels == marker)
+    lost = own[(d.frame_of[own] >= 140) & (d.frame_of[own] < 152)]
+    labels[lost] = -1
+    model = am.estimate_model(made.detections).model
+    edit = Edit(kind="same", at=at(d, own[20], lost[6]))
+    found = am.tracking.correct(am.Tracks(detections=d, labels=labels), [edit], model)
+    assert (found.labels == truth.labels).all()

@@ -282,13 +282,14 @@ def test_places_are_in_words_the_worst_first(tmp_path):
     tracks = uncertain(
         (2, 20, 29, 0.5, [(3, 0.5)]),
         (0, 54, 181, 0.62, [(None, 0.07), (1, 0.31), (3, 0.01)]),
-        (2, 190, 191, 0.79, [(3, 0.2)]),  # less than half a wrong point
+        (2, 190, 191, 0.79, [(3, 0.2)]),  # less than half a wrong point, near the first place
     )
     page = written(tmp_path, tracks).decode()
     (first, words), (second, _) = places_on(page)
     sentence = " ".join(words.split("0.54\xa0s")[1].replace("\xa0", " ").split())
     assert sentence == (
-        "RTOE , frames 54 to 181: 62 %, or RMT1 31 %, unknown marker 7 %; about 49 wrong points"
+        "RTOE , frames 54 to 181: 62 %, or RMT1 31 %, unknown marker 7 %; "
+        "1 more part, also of LTOE; about 49 wrong points"
     )
     assert (first["track"], first["frame"], first["last"]) == ("0", "54", "181")
     assert first["tracks"] == "0 1"
@@ -327,6 +328,18 @@ def test_a_subject_that_walks_out_and_in_is_one_place_each_time():
     of_names = tuple(dataclasses.replace(each, kind="name") for each in names.decisions)
     names = dataclasses.replace(names, decisions=of_names, identity_confidence=None)
     assert len(places_of(names)) == 4
+
+
+def test_a_single_uncertain_detection_is_part_of_the_nearest_place():
+    from asterism.reporting.places import places_of
+
+    large = [(0, 100, 120, 0.6, []), (0, 300, 320, 0.6, [])]
+    small = [(1, 60, 60, 0.5, []), (2, 280, 280, 0.5, []), (3, 200, 200, 0.5, [])]
+    first, second = places_of(uncertain(*large, *small, n_frames=600))
+    assert (first.tracks, first.first, first.last) == ((0, 1), 60, 120)
+    assert (second.tracks, second.first, second.last) == ((0, 2), 280, 320)
+    assert first.expected_wrong == pytest.approx(0.4 * 21 + 0.5)
+    assert places_of(uncertain(*small, n_frames=600)) == ()
 
 
 def test_severity_is_a_word_and_a_sign(tmp_path):

@@ -9,7 +9,11 @@ import asterism as am
 from asterism import _engine
 from asterism.model.compiled import motion_model, steps_of
 from asterism.tracking.stitching import exchanged as module
-from asterism.tracking.stitching.exchanged import exchanged_back, exchanged_by_distances
+from asterism.tracking.stitching.exchanged import (
+    exchanged_back,
+    exchanged_by_distances,
+    with_markers,
+)
 from asterism.tracking.stitching.passes import Pass
 from tests.references.distance_exchanges import stretches
 from tests.scenes import sized
@@ -188,6 +192,22 @@ def test_a_join_over_a_part_that_left_is_as_probable_as_the_exchange(monkeypatch
     assert after.after.tolist() == [-1, -1, 1, 0, 2]
     p = 1 / (1 + np.exp(-_engine.Stitcher.ODDS_FACTOR * 8))
     assert after.probabilities.tolist() == pytest.approx([0.9, 0.9, p, p, p])
+
+
+def test_a_tracklet_ends_where_a_part_of_another_fills_its_gap():
+    """Two tracklets in frames 0, 0, 1, 1, 2, 3, 3; the detection of frame 2 moves."""
+    found = Pass(
+        tracklets=np.array([0, 1, 0, 1, 0, 0, 1, -1, 2], dtype=np.int32),
+        markers=np.array([0, 1, -2], dtype=np.int32),
+        after=np.full(3, -1, dtype=np.int32),
+        probabilities=np.array([1.0, 1.0, 0.6]),
+    )
+    labels = np.array([0, 1, 0, 1, 1, 0, 1, -1, -1])
+    after = with_markers(found, labels, np.where(np.arange(9) == 4, 0.8, np.nan))
+    assert after.tracklets.tolist() == [0, 1, 0, 1, 2, 3, 4, -1, 5]
+    assert after.markers.tolist() == [0, 1, 1, 0, 1, -2]
+    assert after.after.tolist() == [-1, -1, 1, 0, 2, -1]
+    assert after.probabilities.tolist() == [1.0, 1.0, 0.8, 0.8, 0.8, 0.6]
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ import pytest
 import asterism as am
 from asterism.cli import main
 from asterism.simulate import Burst
-from asterism.tracking.attempts import Uncorrected, expected_right, refined_by_own_distances
+from asterism.tracking.attempts import Uncorrected, refined_by_own_distances
 from asterism.tracking.choose import partners
 
 
@@ -116,6 +116,35 @@ def test_a_recipe_repeats_what_was_kept(fast):
     np.testing.assert_array_equal(planned.labels, tracks.labels)
 
 
+def test_parts_that_moved_by_their_own_distances_are_joins():
+    walk = am.simulate.person(activity="walk", frames=300, seed=14)
+    truth = am.simulate.corrupt(walk, missing=0.1, clutter=0.1, noise=3e-4, stride=4, seed=14)
+    tracks = am.track(truth.detections)
+    assert tracks.info["refinements"] > 0
+    model = am.tracking.tracklet_model(tracks.recipe.model)
+    tracklets = am.track(truth.detections, am.TOMHT(), model=model, seed=0)
+    before = am.stitch(tracklets, model).tracks
+    order, offsets = before.by_track
+    then = np.split(tracks.labels[order], offsets[1:-1])
+    main = np.array([np.bincount(own[own >= 0]).argmax() for own in then])
+    moved = order[main[before.labels[order]] != tracks.labels[order]]
+    assert len(moved) > 10
+    joins = {(each.track, each.last) for each in tracks.decisions if each.kind == "join"}
+    assert len(joins) == tracks.info["joins"]
+    for k in np.unique(tracks.labels[moved]):
+        own = np.flatnonzero(tracks.labels == k)
+        begins = own[1:][np.diff(np.isin(own, moved).astype(int)) != 0]
+        assert {(k, each) for each in truth.detections.frame_of[begins]} <= joins
+
+
+def test_the_progress_of_both_methods_is_one(fast):
+    truth, _ = fast
+    n, done = truth.detections.n_frames, []
+    am.track(truth.detections, progress=done.append)
+    assert done == sorted(done)
+    assert (n // 2 in done, done[-1]) == (True, n)
+
+
 def test_certain_identities_need_no_further_attempt(monkeypatch):
     truth, model = clip("bodies")
 
@@ -142,11 +171,10 @@ def test_own_distances_undo_exchanges_of_three_markers(seed, marker):
     plan = am.tracking.plan_tracking(walk.detections)
     found = Uncorrected(tracks=turned, recipe=plan.recipe, model=plan.recipe.model)
     assert am.evaluate(turned, walk).idf1 < 0.99
-    n_right = expected_right(found)
-    assert n_right / len(labels) == pytest.approx(0.989, abs=0.003)
-    refined = refined_by_own_distances(found, n_right)
+    assert found.expected_right / len(labels) == pytest.approx(0.989, abs=0.003)
+    refined = refined_by_own_distances(found)
     assert am.evaluate(refined.tracks, walk).idf1 == 1
-    assert expected_right(refined) > n_right
+    assert refined.expected_right > found.expected_right
     assert not any(refined.tracks.names)
 
 
@@ -164,20 +192,20 @@ def test_names_that_make_identities_less_certain_are_not_kept(fast, monkeypatch)
         return SimpleNamespace(tracks=dataclasses.replace(given, labels=labels))
 
     monkeypatch.setattr("asterism.tracking.attempts.name_tracks", exchanged)
-    n_right = expected_right(found)
-    assert n_right < 0.998 * (tracks.labels >= 0).sum()
-    assert refined_by_own_distances(found, n_right) is found
+    assert found.is_doubtful
+    assert refined_by_own_distances(found) is found
 
 
 @pytest.mark.parametrize("kept", [3, 0])
-def test_too_few_tracks_are_not_named_by_their_own_distances(kept):
+def test_too_few_tracks_are_not_named_by_their_own_distances(kept, monkeypatch):
+    monkeypatch.setattr("asterism.tracking.attempts.DOUBTFUL", -1.0)
     walk = am.simulate.person(activity="walk", frames=60, seed=1)
     few = am.Tracks(
         detections=walk.detections, labels=np.where(walk.labels < kept, walk.labels, -1)
     )
     plan = am.tracking.plan_tracking(walk.detections)
     found = Uncorrected(tracks=few, recipe=plan.recipe, model=plan.recipe.model)
-    assert refined_by_own_distances(found, 0.0) is found
+    assert refined_by_own_distances(found) is found
 
 
 def test_tracks_to_begin_with_are_for_mcmcda():

@@ -21,9 +21,10 @@ __all__ = ["Place", "places_of"]
 UNCERTAIN = 0.8
 """Probability of an identity or a name from which no look is needed."""
 MIN_EXPECTED = 1.0
-"""Smallest expected number of wrong detections of a place."""
+"""Smallest expected number of wrong detections of a place. Fewer are added to the nearest place."""
 NEAR_SECONDS = 0.5
-"""Time within which uncertain parts of a track, or of two that may be exchanged, are one place."""
+"""Time within which uncertain parts of a track, or of two that may be exchanged, are one place, and
+within which less uncertain ones are added to a place."""
 MAX_SECONDS = 5.0
 """Longest time from the first to the last frame of a place whose parts follow each other."""
 SHARED = 0.5
@@ -93,7 +94,8 @@ def places_of(tracks: Tracks) -> tuple[Place, ...]:
     tuple of Place
         Identities and names of a probability below `UNCERTAIN`. One place are parts of one track
         that follow each other, parts of two tracks that may be exchanged, and long parts of several
-        tracks at one time, as of a subject that walks out and in again.
+        tracks at one time, as of a subject that walks out and in again. Joins, and parts with less
+        than one expected wrong detection, are in the nearest place within half a second.
 
     Examples
     --------
@@ -127,12 +129,23 @@ def places_of(tracks: Tracks) -> tuple[Place, ...]:
         else:
             groups.append([each])
             near.append(groups[-1])
-    places = [
-        Place(decisions=tuple(sorted(own, key=lambda each: (-each.expected_wrong, each.track))))
-        for own in groups
-    ]
-    places = [each for each in places if each.expected_wrong >= MIN_EXPECTED]
+    places = _without_small([Place(decisions=tuple(own)) for own in groups], times)
     return tuple(sorted(places, key=lambda each: (-each.expected_wrong, each.first)))
+
+
+def _without_small(places: list[Place], times: NDArray[np.float64]) -> Iterator[Place]:
+    """Add the places with few expected wrong detections to the others, if these are near."""
+    large = [each for each in places if each.expected_wrong >= MIN_EXPECTED]
+    decisions = [list(each.decisions) for each in large]
+    begins, ends = (times[[getattr(each, at) for each in large]] for at in ("first", "last"))
+    for each in places if large else ():
+        away = np.maximum(times[each.first] - ends, begins - times[each.last])
+        nearest = int(np.argmin(away))
+        if each.expected_wrong < MIN_EXPECTED and away[nearest] <= NEAR_SECONDS:
+            decisions[nearest] += each.decisions
+    for own in decisions:
+        own.sort(key=lambda each: (-each.expected_wrong, each.track))
+        yield Place(decisions=tuple(own))
 
 
 def _of_confidence(tracks: Tracks) -> Iterator[Decision]:

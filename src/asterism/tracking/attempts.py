@@ -7,14 +7,19 @@ right. It decides between the attempts.
 from __future__ import annotations
 
 import dataclasses
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from asterism.records import record
 from asterism.tracking.confidence import assess
+from asterism.tracking.confidence.identity import OTHER_JOIN
 from asterism.tracking.methods import METHODS, TOMHT, method_by_name, options_of
 from asterism.tracking.methods.associate import associate
 from asterism.tracking.naming import learn_marker_set, name_tracks
 from asterism.tracking.stitching import stitch, tracklet_model
+from asterism.tracking.stitching.exchanged import with_markers
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,14 +29,7 @@ if TYPE_CHECKING:
     from asterism.tracking.naming import Naming
     from asterism.tracking.stitching import Stitching
 
-__all__ = [
-    "Uncorrected",
-    "assessed",
-    "attempt",
-    "expected_right",
-    "most_certain",
-    "refined_by_own_distances",
-]
+__all__ = ["Uncorrected", "attempt", "most_certain", "refined_by_own_distances"]
 
 DOUBTFUL = 0.002
 """Share of the detections whose identity is expected to be wrong, from which there are further
@@ -72,6 +70,25 @@ class Uncorrected:
     stitching: Stitching | None = None
     naming: Naming | None = None
 
+    @cached_property
+    def assessed(self) -> Tracks:
+        """The tracks with the confidence of their identities."""
+        threads = self.recipe.options.get("threads", 1)
+        return assess(self.tracks, self.model, self.stitching, threads=threads)
+
+    @property
+    def expected_right(self) -> float:
+        """Number of detections whose identity is expected to be right."""
+        confidence = self.assessed.identity_confidence
+        assert confidence is not None
+        return float(confidence.sum())
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether more than `DOUBTFUL` of the detections are expected to be wrong."""
+        labels = self.tracks.labels
+        return int((labels >= 0).sum()) - self.expected_right > DOUBTFUL * len(labels)
+
 
 def attempt(
     recipe: Recipe,
@@ -103,80 +120,62 @@ def attempt(
 
 
 def most_certain(
-    first: Uncorrected, detections: Detections, *, progress: Callable[[int], Any] | None = None
+    recipe: Recipe,
+    detections: Detections,
+    method: Method[Any] | None = None,
+    *,
+    start: Tracks | None = None,
+    progress: Callable[[int], Any] | None = None,
 ) -> Uncorrected:
-    """Make further attempts while identities are uncertain, and return the most certain result.
+    """Make attempts while identities are uncertain, and return the most certain result.
 
-    The first is by `TOMHT`. Then `refined_by_own_distances` follows.
+    The first is by the method of the recipe, the second by `TOMHT`. Then
+    `refined_by_own_distances` follows. For `progress`, a frame of each method counts as half.
 
     Parameters
     ----------
-    first : Uncorrected
-        Result of the method of the recipe.
-    detections, progress
+    recipe, detections, method, start, progress
         As for `carry_out`.
     """
-    best, n_best = first, expected_right(first)
-    if _is_doubtful(best, n_best) and first.recipe.method != TOMHT.name:
-        other = _by_tomht(first, detections, progress)
-        if (n_right := expected_right(other)) > n_best:
-            shares = (100 * n / detections.n_points for n in (n_right, n_best))
-            best, n_best = _with_reason(other, first.recipe, *shares), n_right
-    return refined_by_own_distances(best, n_best)
 
+    def advance(done: int) -> None:
+        if progress is not None:
+            progress(done)
 
-def assessed(found: Uncorrected, tracks: Tracks) -> Tracks:
-    """Return tracks with the confidence of their identities.
-
-    Parameters
-    ----------
-    found : Uncorrected
-        Result from which the tracks come.
-    tracks : Tracks
-        Its tracks, or its tracks after edits.
-    """
-    threads = found.recipe.options.get("threads", 1)
-    return assess(tracks, found.model, found.stitching, threads=threads)
-
-
-def expected_right(found: Uncorrected) -> float:
-    """Return the number of detections whose identity is expected to be right.
-
-    Parameters
-    ----------
-    found : Uncorrected
-        Result of an attempt.
-    """
-    confidence = assessed(found, found.tracks).identity_confidence
-    assert confidence is not None
-    return float(confidence.sum())
-
-
-def _is_doubtful(found: Uncorrected, n_right: float) -> bool:
-    labels = found.tracks.labels
-    return int((labels >= 0).sum()) - n_right > DOUBTFUL * len(labels)
+    n = detections.n_frames
+    best = attempt(
+        recipe, detections, method, start=start, progress=lambda done: advance(done // 2)
+    )
+    if best.is_doubtful and recipe.method != TOMHT.name:
+        other = _by_tomht(recipe, detections, lambda done: advance((n + done) // 2))
+        if other.expected_right > best.expected_right:
+            best = _with_reason(other, best)
+    best = refined_by_own_distances(best)
+    advance(n)
+    return best
 
 
 def _by_tomht(
-    first: Uncorrected, detections: Detections, progress: Callable[[int], Any] | None
+    recipe: Recipe, detections: Detections, progress: Callable[[int], Any]
 ) -> Uncorrected:
     method = TOMHT()
-    recipe = dataclasses.replace(first.recipe, method=method.name, options=options_of(method))
+    recipe = dataclasses.replace(recipe, method=method.name, options=options_of(method))
     return attempt(recipe, detections, method, progress=progress)
 
 
-def _with_reason(other: Uncorrected, before: Recipe, share: float, less: float) -> Uncorrected:
+def _with_reason(other: Uncorrected, before: Uncorrected) -> Uncorrected:
     """Return a result whose recipe states why it is better than that of another method."""
+    share, less = (100 * each.expected_right / len(each.tracks.labels) for each in (other, before))
     reason = (
-        f"{before.reason}; {share:.1f} % of the detections are expected to have the right "
-        f"identity, against {less:.1f} % with {before.label}"
+        f"{before.recipe.reason}; {share:.1f} % of the detections are expected to have the right "
+        f"identity, against {less:.1f} % with {before.recipe.label}"
     )
     recipe = dataclasses.replace(other.recipe, reason=reason)
     tracks = dataclasses.replace(other.tracks, recipe=recipe)
     return dataclasses.replace(other, tracks=tracks, recipe=recipe)
 
 
-def refined_by_own_distances(found: Uncorrected, n_right: float) -> Uncorrected:
+def refined_by_own_distances(found: Uncorrected) -> Uncorrected:
     """Name tracks by marker sets learnt from them, while that makes more identities certain.
 
     Parts of tracks change to the marker whose distances they keep.
@@ -185,8 +184,6 @@ def refined_by_own_distances(found: Uncorrected, n_right: float) -> Uncorrected:
     ----------
     found : Uncorrected
         Tracks without names.
-    n_right : float
-        Expected number of detections with the right identity.
     """
     tracks = found.tracks
     is_present = tracks.lengths >= PRESENT * tracks.detections.n_frames
@@ -196,17 +193,26 @@ def refined_by_own_distances(found: Uncorrected, n_right: float) -> Uncorrected:
     names = tuple(f"M{k}" if own else None for k, own in enumerate(is_present))
     named, best = dataclasses.replace(tracks, names=names), found
     for n in range(1, MAX_ROUNDS + 1):
-        if not _is_doubtful(best, n_right):
+        if not best.is_doubtful:
             break
         named = name_tracks(named, learn_marker_set(named)).tracks
-        unnamed = dataclasses.replace(
-            tracks,
-            labels=named.labels,
-            names=(None,) * named.n_tracks,
-            info={**tracks.info, "refinements": n},
-        )
-        refined = dataclasses.replace(found, tracks=unnamed)
-        if (n_refined := expected_right(refined)) <= n_right:
+        refined = _renamed(found, named, n)
+        if refined.expected_right <= best.expected_right:
             break
-        best, n_right = refined, n_refined
+        best = refined
     return best
+
+
+def _renamed(found: Uncorrected, named: Tracks, n: int) -> Uncorrected:
+    """Return a result with the labels of named tracks; the parts that moved are joins there."""
+    info, stitching = {**found.tracks.info, "refinements": n}, found.stitching
+    if stitching is not None:
+        certainty = np.full(len(named.labels), OTHER_JOIN)
+        stitching = with_markers(stitching, named.labels, certainty)
+        info["joins"] = len(stitching.joins)
+    tracks = dataclasses.replace(
+        found.tracks, labels=named.labels, names=(None,) * named.n_tracks, info=info
+    )
+    if stitching is not None:
+        stitching = dataclasses.replace(stitching, tracks=tracks)
+    return dataclasses.replace(found, tracks=tracks, stitching=stitching)

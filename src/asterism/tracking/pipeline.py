@@ -11,7 +11,7 @@ from asterism.errors import ParameterError
 from asterism.model import Detections, Edit, MarkerSet, Recipe, TrackingModel, Tracks
 from asterism.model.recipe import hash_of_edits, sha256_of, versions
 from asterism.records import record
-from asterism.tracking.attempts import Uncorrected, assessed, attempt, most_certain
+from asterism.tracking.attempts import Uncorrected, attempt, most_certain
 from asterism.tracking.correction import correct, settled
 from asterism.tracking.decisions import of_filling, of_naming, of_stitching
 from asterism.tracking.filling import LONGEST, fill_gaps
@@ -108,7 +108,8 @@ def track(
         ``tracks.recipe`` of an earlier call, which is repeated bit for bit. It replaces `method`,
         `model`, `stitch`, `seed` and `fill`; initial tracks, marker sets and edits are given again.
     progress : callable, optional
-        Called from time to time with the number of finished frames.
+        Called from time to time with the number of finished frames. Without a method, each of the
+        two that may run counts as half.
 
     Returns
     -------
@@ -219,9 +220,8 @@ def without_edits(
         As for `carry_out`.
     """
     _warn_of_versions(recipe)
-    found = attempt(recipe, detections, method, start=start, progress=progress)
-    if recipe.retry:
-        found = most_certain(found, detections, progress=progress)
+    make = most_certain if recipe.retry else attempt
+    found = make(recipe, detections, method, start=start, progress=progress)
     if not recipe.markers:
         return found
     naming = name_tracks(found.tracks, *(marker_sets or ()))
@@ -240,8 +240,10 @@ def conclude(begun: Uncorrected, edits: Sequence[Edit] = ()) -> Tracked:
     """
     model, stitching, naming = begun.model, begun.stitching, begun.naming
     recipe = dataclasses.replace(begun.recipe, edits=hash_of_edits(edits))
-    tracks = correct(begun.tracks, edits, model, stitching) if edits else begun.tracks
-    tracks = settled(assessed(begun, tracks), edits)
+    if edits:
+        corrected = correct(begun.tracks, edits, model, stitching)
+        begun = dataclasses.replace(begun, tracks=corrected)
+    tracks = settled(begun.assessed, edits)
     decisions = tracks.decisions
     if stitching is not None:
         decisions += of_stitching(stitching, tracks)

@@ -9,7 +9,7 @@ import numpy as np
 from asterism.tracking.confidence.calibration import MARGINS, PART
 from asterism.tracking.confidence.identity import examine
 from asterism.tracking.confidence.parts import PART_FRAMES
-from asterism.tracking.rigidity.profiles import learn_profiles
+from asterism.tracking.rigidity.profiles import candidate_densities, learn_profiles
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -97,6 +97,31 @@ class Evidence:
         found = self._densities(own, labels, others)[0][0, :-1]
         order = np.argsort(-found, kind="stable")
         return [int(others[i]) for i in order if found[i] != 0][:n]
+
+    def log_odds(
+        self, detections: NDArray[np.int64], labels: NDArray[np.int64], track: int
+    ) -> NDArray[np.float64]:
+        """Return the log odds that single detections are of the marker of a track.
+
+        They are those of a part of one detection that no other track has as an alternative.
+
+        Parameters
+        ----------
+        detections : ndarray of int, shape (n,)
+            Detections without a track, in frames in which the track has none.
+        labels : ndarray of int, shape (N,)
+            Track of each detection now.
+        track : int
+            The track.
+
+        Returns
+        -------
+        ndarray of shape (n,)
+            Log odds, 0 for a track that keeps no distances.
+        """
+        density = candidate_densities(self._detections, labels, self._noise, detections, track)
+        found = PART[0] + PART[1] * np.clip(density, *MARGINS) + PART[2] * MARGINS[1]
+        return np.where(density == 0, 0.0, found)
 
     def _densities(
         self, detections: NDArray[np.int64], labels: NDArray[np.int64], others: NDArray[np.int64]

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from asterism.model import Detections
 
-__all__ = ["Profiles", "learn_profiles"]
+__all__ = ["Profiles", "candidate_densities", "learn_profiles"]
 
 SAMPLES = 160
 """Number of frames from which profiles are learnt."""
@@ -58,20 +58,63 @@ def learn_profiles(
         Frames with parts of tracks that will be compared with the profiles.
     """
     d = detections
-    n = min(SAMPLES, d.n_frames)
-    samples = np.arange(n) * d.n_frames // max(n, 1)
+    samples = _samples(d)
     frames = samples if also is None else np.union1d(samples, also)
+    rows, offsets = _rows(d, frames)
+    engine = _engine.DistanceProfiles(
+        np.ascontiguousarray(d.points[rows]), labels[rows], offsets,
+        np.searchsorted(frames, samples).astype(np.int64),
+        n_tracks=int(labels.max(initial=-1)) + 1, noise=noise_sigma,
+    )  # fmt: skip
+    return Profiles(frames=frames, engine=engine)
+
+
+def candidate_densities(
+    detections: Detections,
+    labels: NDArray[np.int64],
+    noise_sigma: float,
+    candidates: NDArray[np.int64],
+    track: int,
+) -> NDArray[np.float64]:
+    """Return how well the distances of single detections fit a track, shape (n,).
+
+    Parameters
+    ----------
+    detections, labels, noise_sigma
+        As for `learn_profiles`.
+    candidates : ndarray of int, shape (n,)
+        Detections in frames in which the track has none.
+    track : int
+        The track.
+
+    Returns
+    -------
+    ndarray of shape (n,)
+        Log densities relative to an unknown marker, 0 for a track that keeps no distances.
+    """
+    d = detections
+    samples = _samples(d)
+    # Each candidate has a copy of its frame.
+    frame = d.frame_of[candidates]
+    rows, offsets = _rows(d, np.concatenate([samples, frame]))
+    own, first = labels[rows], offsets[len(samples) : -1]
+    own[first + candidates - d.offsets[frame]] = track
+    engine = _engine.DistanceProfiles(
+        np.ascontiguousarray(d.points[rows]), own, offsets, np.arange(len(samples)),
+        n_tracks=int(labels.max(initial=track)) + 1, noise=noise_sigma,
+    )  # fmt: skip
+    n, none = len(candidates), np.empty(0, dtype=np.int64)
+    at = len(samples) + np.arange(n)
+    return -engine.densities(np.full(n, track), at, np.arange(n + 1), none)[:, 0]
+
+
+def _samples(d: Detections) -> NDArray[np.int64]:
+    n = min(SAMPLES, d.n_frames)
+    return np.arange(n) * d.n_frames // max(n, 1)
+
+
+def _rows(d: Detections, frames: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the detections of frames, and where each frame begins among them."""
     counts = d.counts[frames]
     offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-    rows = np.repeat(d.offsets[frames] - offsets[:-1], counts) + np.arange(offsets[-1])
-    return Profiles(
-        frames=frames,
-        engine=_engine.DistanceProfiles(
-            np.ascontiguousarray(d.points[rows]),
-            labels[rows],
-            offsets,
-            np.searchsorted(frames, samples).astype(np.int64),
-            n_tracks=int(labels.max(initial=-1)) + 1,
-            noise=noise_sigma,
-        ),
-    )
+    return np.repeat(d.offsets[frames] - offsets[:-1], counts) + np.arange(offsets[-1]), offsets

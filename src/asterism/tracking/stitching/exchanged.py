@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -15,8 +15,11 @@ if TYPE_CHECKING:
 
     from asterism.model import Detections, TrackingModel
     from asterism.tracking.stitching.passes import Pass
+    from asterism.tracking.stitching.whole import Stitching
 
-__all__ = ["exchanged_back", "exchanged_by_distances"]
+__all__ = ["exchanged_back", "exchanged_by_distances", "with_markers"]
+
+P = TypeVar("P", "Pass", "Stitching")
 
 ROUNDS = 5
 """Largest number of times that stretches are searched. Three markers in turn take two."""
@@ -98,16 +101,36 @@ def exchanged_by_distances(d: Detections, found: Pass, model: TrackingModel) -> 
     labels, log_odds = exchanged_back(d, before, model)
     if np.array_equal(labels, before):
         return found
-    # Each part of a tracklet with a marker of its own is a tracklet; they are numbered by their
-    # start, as before.
+    log_odds[np.isinf(log_odds)] = np.nan
+    return with_markers(found, labels, 1 / (1 + np.exp(-_engine.Stitcher.ODDS_FACTOR * log_odds)))
+
+
+def with_markers(found: P, labels: NDArray[np.int64], probabilities: NDArray[np.float64]) -> P:
+    """Change the markers of tracklets, or of parts of them.
+
+    Parameters
+    ----------
+    found : Pass or Stitching
+        Tracklets with their markers.
+    labels : ndarray of int, shape (N,)
+        Marker of each detection from now on; without one are the same detections as before.
+    probabilities : ndarray of shape (N,)
+        Probability that each detection changed its marker rightly, NaN for those that did not.
+
+    Returns
+    -------
+    Pass or Stitching
+        With each part of a tracklet that has a marker of its own as a tracklet.
+    """
+    # A tracklet ends where its marker changes, and where another tracklet is on its marker.
+    # Tracklets are numbered by their start, as before.
     inside = np.flatnonzero(found.tracklets >= 0)
-    order = inside[np.argsort(found.tracklets[inside], kind="stable")]
-    begins = np.ones(len(order), dtype=bool)
-    begins[1:] = np.diff(found.tracklets[order]) != 0
-    is_edge = np.zeros(len(order), dtype=bool)
-    is_edge[1:] = ~begins[1:] & (np.diff(labels[order]) != 0)
-    part = np.cumsum(begins | is_edge) - 1
-    first = order[begins | is_edge]
+    of, marker = found.tracklets[inside].astype(np.int64), labels[inside]
+    marker = np.where(marker >= 0, marker, labels.max() + 1 + of)  # each ghost is alone
+    is_start = _changes(of, marker) | _changes(marker, of)
+    order = np.argsort(marker, kind="stable")
+    part, order = np.cumsum(is_start[order]) - 1, inside[order]
+    first = order[np.flatnonzero(np.diff(part, prepend=-1))]
     number = np.argsort(np.argsort(first, kind="stable"), kind="stable")
     tracklets = np.full(len(found.tracklets), -1, dtype=np.int32)
     tracklets[order] = number[part]
@@ -118,26 +141,31 @@ def exchanged_by_distances(d: Detections, found: Pass, model: TrackingModel) -> 
     chain = np.lexsort((np.arange(len(starts)), markers))
     follows = (np.diff(markers[chain]) == 0) & (markers[chain[1:]] >= 0)
     after[chain[1:][follows]] = chain[:-1][follows]
-    # A join that was there before keeps its probability; the others have that of the exchange.
-    probabilities = found.probabilities[old].copy()
-    last = np.full(len(starts), -1)
-    last[tracklets[order]] = order
+    # A join that was there before keeps its probability; the others have that of the change.
     joined = np.flatnonzero(after >= 0)
-    same = (found.after[old[joined]] == found.tracklets[last[after[joined]]]) & (
-        starts[joined] == _first_of(found.tracklets)[old[joined]]
-    )
-    new = joined[~same]
-    odds = np.minimum(log_odds[starts[new]], log_odds[last[after[new]]])
-    odds[np.isinf(odds)] = log_odds.min()  # joined over a part that left: by some exchange
-    probabilities[new] = 1 / (1 + np.exp(-_engine.Stitcher.ODDS_FACTOR * odds))
-    return replace(
-        found, tracklets=tracklets, markers=markers, after=after, probabilities=probabilities
-    )
+    (firsts, lasts), last = _extents(found.tracklets), _extents(tracklets)[1]
+    is_new = found.after[old[joined]] != found.tracklets[last[after[joined]]]
+    is_new |= starts[joined] != firsts[old[joined]]
+    is_new |= last[after[joined]] != lasts[old[after[joined]]]
+    new, kept = joined[is_new], found.probabilities[old].copy()
+    least = np.fmin(probabilities[starts[new]], probabilities[last[after[new]]])
+    # Two that did not change are joined over a part that left: by some change.
+    kept[new] = np.where(np.isnan(least), np.nanmin(probabilities), least)
+    return replace(found, tracklets=tracklets, markers=markers, after=after, probabilities=kept)
 
 
-def _first_of(tracklets: NDArray[np.int32]) -> NDArray[np.int64]:
-    """Return the first detection of each tracklet."""
-    inside = np.flatnonzero(tracklets >= 0)[::-1]
-    first = np.full(int(tracklets.max(initial=-1)) + 1, -1)
-    first[tracklets[inside]] = inside
-    return first
+def _changes(key: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return whether each element is the first of its key, or follows one of another value."""
+    order = np.argsort(key, kind="stable")
+    found = np.ones(len(key), dtype=bool)
+    found[order[1:]] = (np.diff(key[order]) != 0) | (np.diff(other[order]) != 0)
+    return found
+
+
+def _extents(tracklets: NDArray[np.int32]) -> NDArray[np.int64]:
+    """Return the first and the last detection of each tracklet, shape (2, F)."""
+    inside = np.flatnonzero(tracklets >= 0)
+    found = np.full((2, int(tracklets.max(initial=-1)) + 1), -1)
+    found[0, tracklets[inside[::-1]]] = inside[::-1]
+    found[1, tracklets[inside]] = inside
+    return found

@@ -1,0 +1,325 @@
+"""Solution of edits: the most probable labels that respect what a person states."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.tracking.correction.constraints import Constraints, detections_of
+from asterism.tracking.correction.evidence import Evidence
+from asterism.tracking.correction.exchange import Lane, Motion, best_exchange
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from asterism.model import Edit, TrackingModel, Tracks
+    from asterism.tracking.stitching import Stitching
+
+__all__ = ["NoSolution", "Solver"]
+
+CANDIDATES = 3
+"""Number of other tracks that are considered for a part that leaves its track."""
+CLUTTER = -2
+"""Label, while an edit is solved, of the detections without a track that one of them begins."""
+TRACKED = 3.0
+"""Log odds of a detection that continues a track being of its marker instead of clutter."""
+MAX_SHARED = 0.02
+"""Largest share of the frames of a track that a track of the same marker may have too."""
+IDLE = 50
+"""Frames along a track after which no more detections without a track are looked for."""
+MIN_FIT = -40.0
+"""Smallest log likelihood, relative to straight motion, of a detection that continues another. It
+is far below that of a link of the tracker, which misses markers that accelerate."""
+
+
+class NoSolution(Exception):
+    """No exchange respects the earlier edits."""
+
+
+class Solver:
+    """Labels and names under correction, with the evidence for changes.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks before any edit.
+    model : TrackingModel
+        Model of motion and noise with which they were tracked.
+    stitching : Stitching, optional
+        Stitching that made the tracks.
+
+    Attributes
+    ----------
+    labels : ndarray of int, shape (N,)
+        Track of each detection now, -1 for clutter.
+    names : list of (str or None)
+        Name of each track now.
+    evidence : Evidence
+        Parts of the tracks before any edit.
+    """
+
+    def __init__(
+        self, tracks: Tracks, model: TrackingModel, stitching: Stitching | None = None
+    ) -> None:
+        self._d = tracks.detections
+        self.evidence = Evidence(tracks, model, stitching)
+        self._motion = Motion(self._d, model)
+        self.labels = tracks.labels.copy()
+        self.names = list(tracks.names)
+        self._constraints = Constraints(self._d)
+
+    def solve(self, edit: Edit, constraints: Constraints) -> None:
+        """Change labels and names so that they respect one more edit.
+
+        Parameters
+        ----------
+        edit : Edit
+            Next edit.
+        constraints : Constraints
+            Constraints of the earlier edits.
+
+        Raises
+        ------
+        NoSolution
+            If no exchange respects the earlier edits; labels and names may have changed.
+        """
+        self._constraints = constraints
+        own = detections_of(edit, self._d)
+        if edit.kind == "same":
+            self._join(own)
+        elif edit.kind in ("different", "cut"):
+            self._part(own, is_here=edit.kind == "cut")
+        elif edit.kind == "clutter":
+            self._drop(own[0])
+        elif edit.kind == "name":
+            self._call(own[0], edit.name)
+
+    def _join(self, own: Sequence[int]) -> None:
+        """Bring two detections to one track."""
+        a, b = (int(self.labels[i]) for i in own)
+        if a == b >= 0:
+            return
+        if a < 0 and b < 0:
+            a = self._new_track()
+            self._take(own[0], a)
+        if a < 0 or b < 0:
+            (one, other), track = (own, b) if a < 0 else ((own[1], own[0]), a)
+            self._take(one, track, beside=other)
+            return
+        if self._may_be_one(*own):
+            frame = self._d.frame_of
+            is_shared = np.isin(frame, frame[self.labels == a])
+            self.labels[(self.labels == b) & ~is_shared] = a
+            if self.names[b] is not None:
+                self.names[a], self.names[b] = self.names[b], None
+            return
+        self._carry_out(
+            self._solve(own[1], b, a, beside=own[0]), self._solve(own[0], a, b, beside=own[1])
+        )
+
+    def _may_be_one(self, one: int, other: int) -> bool:
+        """Return whether the tracks of two detections may be of one marker as a whole.
+
+        They share hardly a frame, no stated detection is in one of these, and neither an edit nor
+        their names keep them apart.
+        """
+        a, b = int(self.labels[one]), int(self.labels[other])
+        first, second = (self._d.frame_of[self.labels == k] for k in (a, b))
+        shared = np.intersect1d(first, second)
+        stated = [i for i in (*self._constraints.pinned, one, other) if self.labels[i] in (a, b)]
+        return (
+            len(shared) <= MAX_SHARED * min(len(first), len(second))
+            and None in (self.names[a], self.names[b])
+            and not np.isin(self._d.frame_of[stated], shared).any()
+            and all(self._may_be(i, a) for i in stated if self.labels[i] == b)
+        )
+
+    def _part(self, own: Sequence[int], is_here: bool) -> None:
+        """Bring two detections of one track to different tracks."""
+        a, b = (int(self.labels[i]) for i in own)
+        if a != b or a < 0:
+            return
+        found: list[_Solution | None] = []
+        later = max(own, key=lambda i: self._d.frame_of[i])
+        cut = int(self._d.frame_of[later]) if is_here else None
+        for detection, beside in ((own[0], own[1]), (own[1], own[0])):
+            others = self.evidence.best(detection, self.labels, CANDIDATES)
+            found += [
+                self._solve(detection, a, other, cut, beside=beside)
+                for other in (*others, len(self.names))
+            ]
+        self._carry_out(*found)
+        if (self.labels == len(self.names)).any():
+            self._new_track()
+
+    def _drop(self, detection: int) -> None:
+        """Make the part of a detection clutter."""
+        track = int(self.labels[detection])
+        if track < 0:
+            return
+        own = np.flatnonzero(
+            (self.evidence.part_of == self.evidence.part_of[detection]) & (self.labels == track)
+        )
+        pinned = np.isin(own, list(self._constraints.pinned))
+        frame = self._d.frame_of
+        low = frame[own[pinned & (own < detection)]].max(initial=-1)
+        high = frame[own[pinned & (own > detection)]].min(initial=self._d.n_frames)
+        self.labels[own[(frame[own] > low) & (frame[own] < high)]] = -1
+
+    def _call(self, detection: int, name: str) -> None:
+        """Bring a detection to the track of a name."""
+        track = int(self.labels[detection])
+        named = self.names.index(name) if name in self.names else -1
+        if track < 0:
+            track = named if named >= 0 else self._new_track()
+            self._take(detection, track)
+        elif named >= 0 and named != track:
+            self._carry_out(self._solve(detection, track, named))
+        elif named < 0:
+            others = [i for i in self._constraints.pinned if self.labels[i] == track]
+            if any(self._constraints.name(i) not in ("", name) for i in others):
+                target = self._new_track()
+                self._carry_out(self._solve(detection, track, target))
+                track = target
+            self.names[track] = name
+            return
+        if named < 0:
+            self.names[track] = name
+
+    def _may_be(self, detection: int, track: int) -> bool:
+        """Return whether no edit states that a detection is not of the marker of a track."""
+        return not any(
+            self._constraints.are_different(detection, i)
+            for i in self._constraints.pinned
+            if self.labels[i] == track
+        )
+
+    def _new_track(self) -> int:
+        self.names.append(None)
+        return len(self.names) - 1
+
+    def _solve(
+        self,
+        detection: int,
+        source: int,
+        target: int,
+        cut: int | None = None,
+        beside: int | None = None,
+        labels: NDArray[np.int64] | None = None,
+    ) -> _Solution | None:
+        """Return the gain and the labels with a detection and its group on another track.
+
+        Detections of other groups stay. The detection `beside` of the same edit stays where it is.
+        """
+        if not self._may_be(detection, target):
+            return None
+        labels = self.labels.copy() if labels is None else labels
+        group = self._constraints.group(detection)
+        own = np.array(sorted(self._constraints.pinned | group))
+        is_group = np.isin(own, list(group))
+        stated = np.zeros(len(labels), dtype=np.int8)
+        stated[own] = np.where(is_group & (labels[own] == source), 1, -1)
+        if beside is not None:
+            stated[beside] = -1
+        lanes = (
+            self._lane(source, target, labels, stated),
+            self._lane(target, source, labels, stated),
+        )
+        found = best_exchange(lanes, self._motion, cut)
+        if found is None:
+            return None
+        for lane, then in zip(lanes, (target, source), strict=True):
+            labels[lane.detections[found.inside(lane.frames)]] = then
+        return found.gain, labels
+
+    def _lane(
+        self, track: int, other: int, labels: NDArray[np.int64], stated: NDArray[np.int8]
+    ) -> Lane:
+        evidence, own = self.evidence, np.flatnonzero(labels == track)
+        parts = evidence.part_of[own]
+        starts = np.ones(len(own), dtype=bool)
+        starts[1:] = parts[1:] != parts[:-1]
+        before = np.ones(len(own))
+        known = starts & (parts >= 0) & (parts < len(evidence.before))
+        before[known] = evidence.before[parts[known]]
+        return Lane(
+            detections=own,
+            frames=self._d.frame_of[own],
+            gains=(
+                np.full(len(own), TRACKED if track == CLUTTER else -TRACKED)
+                if CLUTTER in (track, other)
+                else evidence.gains(own, labels, other)
+            ),
+            starts=starts,
+            before=before,
+            stated=stated[own],
+        )
+
+    def _carry_out(self, *solutions: _Solution | None) -> None:
+        """Take the labels with the largest gain."""
+        found = [each for each in solutions if each is not None]
+        if not found:
+            raise NoSolution
+        self.labels = max(found, key=lambda each: each[0])[1]
+
+    def _take(self, detection: int, target: int, beside: int | None = None) -> None:
+        """Bring a detection without a track, and those around that continue it, to a track.
+
+        Where the track has a detection in the same frame, both may be exchanged.
+        """
+        labels, frame = self.labels.copy(), self._d.frame_of
+        chain = np.array(self._chain(detection, target))
+        is_taken = np.isin(frame[chain], frame[labels == target])
+        labels[chain[~is_taken]] = target
+        if labels[detection] != target:
+            labels[chain[is_taken]] = CLUTTER
+            found = self._solve(detection, CLUTTER, target, beside=beside, labels=labels)
+            if found is None:
+                raise NoSolution
+            labels = found[1]
+            labels[labels == CLUTTER] = -1  # given for them, or not taken
+        self.labels = labels
+
+    def _chain(self, detection: int, target: int) -> list[int]:
+        """Return the detections without a track that continue one of them to a track.
+
+        They fit by motion or, where the track has none, by its distances to other tracks.
+        """
+        d, labels, frame = self._d, self.labels, self._d.frame_of
+        free = labels < 0
+        free[list(self._constraints.clutter)] = False
+        is_known = np.zeros(d.n_frames, dtype=bool)
+        is_known[frame[labels == target]] = True
+        t = int(frame[detection])
+        near = slice(d.offsets[max(t - IDLE, 0)], d.offsets[min(t + IDLE + 1, d.n_frames)])
+        own = np.arange(near.start, near.stop)[free[near] & ~is_known[frame[near]]]
+        odds = np.zeros(len(labels))
+        odds[own] = self.evidence.log_odds(own, labels, target)
+        chain = [detection]
+        for way in (1, -1):
+            before, head, newest = -1, detection, int(frame[detection])
+            t = newest + way
+            while (
+                0 <= t < d.n_frames
+                and abs(t - int(frame[head])) <= self._motion.max_gap
+                and abs(t - newest) <= IDLE
+            ):
+                own = np.arange(d.offsets[t], d.offsets[t + 1])
+                own = own[free[own] | (labels[own] == target)]
+                if len(own):
+                    fits = self._motion.continuation(before, head, own)
+                    fits = np.maximum(fits, MIN_FIT) + odds[own]
+                    best = int(np.argmax(fits))
+                    if fits[best] > MIN_FIT:
+                        before, head = head, int(own[best])
+                        if labels[head] < 0:
+                            chain.append(head)
+                            newest = t
+                t += way
+        return chain
+
+
+_Solution = tuple[float, "NDArray[np.int64]"]
