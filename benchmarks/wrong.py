@@ -23,9 +23,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-NEXT = 5
-"""Largest number of frames from one detection to the next at which motion is compared, as within a
-tracklet."""
+NEXT = 2
+"""Largest number of frames from one detection to the next at which motion is compared."""
 CONTINUOUS = 0.005
 """Deviation from straight motion, metres, within which motion is continuous."""
 RELATIVE, JUMP = 0.35, 0.01
