@@ -45,8 +45,8 @@ void bind_options(nb::module_& module) {
           "delta"_a, "z"_a);
 
   nb::class_<CarryOptions>(module, "CarryOptions")
-      .def(nb::init<bool, std::int32_t, double>(), nb::kw_only(), "is_on"_a = false,
-           "max_carried"_a = 0, "bond_weight"_a = 0.0);
+      .def(nb::init<bool, std::int32_t>(), nb::kw_only(), "is_on"_a = false,
+           "max_carried"_a = 0);
 
   nb::enum_<Pairing>(module, "Pairing")
       .value("assignment", Pairing::assignment)

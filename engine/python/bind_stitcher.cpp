@@ -10,6 +10,7 @@
 #include "python/arrays.hpp"
 #include "python/bindings.hpp"
 #include "python/motion_arrays.hpp"
+#include "rigid/joint_places.hpp"
 #include "stitch/distance_exchanges.hpp"
 #include "stitch/live_stitcher.hpp"
 
@@ -247,6 +248,49 @@ std::optional<std::tuple<Out<double>, double, std::int32_t>> carry(
 
 // Returns (other markers, frames seen together, mean distances, their variances, predictive
 // variances).
+// Returns the detection of each track in one frame, -1 for none. `ends`, shape (bonds, 2), are the
+// tracks of each bond; `n`, `means` and `variances` its frames and its distance.
+Out<std::int32_t> decide_jointly(const In<double>& centers, const In<double>& track_variances,
+                                 const In<std::int32_t>& ends, const In<std::int64_t>& n,
+                                 const In<double>& means, const In<double>& variances,
+                                 const In<double>& points, const In<std::int32_t>& rows,
+                                 const In<std::int32_t>& columns, const In<double>& gains) {
+  require(centers.ndim() == 2 && points.ndim() == 2 && points.shape(1) == centers.shape(1),
+          "centers and points: shape (n, D)");
+  require(track_variances.size() == centers.shape(0), "track_variances: one for each track");
+  require(ends.size() == 2 * n.size() && means.size() == n.size() && variances.size() == n.size(),
+          "ends, n, means and variances: one for each bond");
+  require(columns.size() == rows.size() && gains.size() == rows.size(),
+          "rows, columns and gains: one for each candidate");
+  const int D = static_cast<int>(centers.shape(1));
+  const std::vector<Point> at = to_points(centers, D), detections = to_points(points, D);
+  std::vector<JointPlaces::Track> tracks;
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    const auto row = static_cast<std::int32_t>(i);
+    tracks.push_back({row, row, at[i], track_variances.data()[i]});
+  }
+  std::vector<std::vector<Bond>> bonds(at.size());
+  for (std::size_t e = 0; e < n.size(); ++e)
+    for (const std::size_t end : {2 * e, 2 * e + 1})
+      bonds.at(ends.data()[end]).push_back(
+          {ends.data()[end ^ 1], n.data()[e], means.data()[e], variances.data()[e]});
+  std::vector<Candidate> candidates;
+  for (std::size_t c = 0; c < rows.size(); ++c) {
+    require(std::cmp_less(rows.data()[c], at.size()) && std::cmp_less(columns.data()[c], detections.size()),
+            "rows and columns: of tracks and points");
+    candidates.push_back({rows.data()[c], columns.data()[c], gains.data()[c], 0});
+  }
+  JointPlaces joint;
+  joint.begin(tracks, at.size(), D, [&](std::int32_t marker) -> std::span<const Bond> { return bonds[marker]; });
+  joint.decide(detections, candidates);
+  std::vector<std::int32_t> found;
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    const Point* place = joint.place(i);
+    found.push_back(place == nullptr ? -1 : static_cast<std::int32_t>(place - detections.data()));
+  }
+  return array_of<std::int32_t>(found);
+}
+
 nb::tuple bonds_of(const Neighbours& neighbours, std::int32_t marker) {
   const std::span<const Bond> bonds = neighbours.of(marker);
   return nb::make_tuple(
@@ -288,6 +332,9 @@ void bind_stitcher(nb::module_& module) {
           },
           "markers"_a, "points"_a)
       .def("of", &bonds_of, "marker"_a);
+  module.def("decide_jointly", &decide_jointly, nb::kw_only(), "centers"_a, "track_variances"_a,
+             "ends"_a, "n"_a, "means"_a, "variances"_a, "points"_a, "rows"_a, "columns"_a,
+             "gains"_a);
   nb::class_<RigidCarrier>(module, "RigidCarrier")
       .def(
           "__init__",

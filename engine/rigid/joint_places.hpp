@@ -55,7 +55,7 @@ class JointPlaces {
       for (const Bond& bond : bonds_of(tracks_[a].marker)) {
         const std::int32_t b = find(bond.other);
         if (b == kNone || bond.n < kMinFrames) continue;
-        if (const Link link = linked(a, b, bond); link.V < kSteady * kSteady * bond.mean * bond.mean)
+        if (const Link link = linked(a, b, bond); link.V < kMaxSpread * kMaxSpread * bond.mean * bond.mean)
           keep_smallest(near_, kMaxLinks, link);
       }
       links_.insert(links_.end(), near_.begin(), near_.end());
@@ -100,6 +100,7 @@ class JointPlaces {
     return a == kNone ? nullptr : place_[a];
   }
   // Sum of p over the bonds of a row's track to others that have a place, for a detection at `y`.
+  // All bonds of a marker may break at once, so that the sum has the bound of one bond.
   double gain(std::size_t row, const Point& y) const {
     const std::int32_t a = at_row_[row];
     double sum = 0;
@@ -109,13 +110,14 @@ class JointPlaces {
       const Point* other = place_[link.a == a ? link.b : link.a];
       if (other != nullptr) sum += effect(link, *other, y);
     }
-    return sum;
+    return std::clamp(sum, kLeast, kMost);
   }
 
  private:
   static constexpr std::int32_t kNone = -1;
-  static constexpr std::int64_t kMinFrames = 5;
+  static constexpr std::int64_t kMinFrames = 10;
   static constexpr std::size_t kMaxLinks = 8;  // of a track
+  static constexpr double kMaxSpread = 0.05;  // largest √V as a fraction of the distance
   static constexpr double kPriorFrames = 2;
   static constexpr int kRounds = 4;
   static constexpr double kDamping = 0.5;

@@ -3,8 +3,8 @@
 //
 // In each frame, after prediction and before association:
 //
-//   1  Tracks detected in the last frame are gated. A track and a detection that are each other's
-//      best candidate fix the marker's position for this frame.
+//   1  All tracks are gated by their own predictions. Bonds decide jointly which detections they
+//      have in this frame (rigid/joint_places.hpp), which fixes the positions of their markers.
 //   2  Occluded tracks are predicted from these positions. The predicted position is fused with the
 //      track's own prediction (rigid/carried_state.hpp).
 //   3  Occluded tracks are gated by the fused or by their own prediction, whichever gives the
@@ -35,7 +35,6 @@ namespace asterism {
 struct CarryOptions {
   bool is_on = false;
   std::int32_t max_carried = 0;  // frames
-  double bond_weight = 0;        // bound in nats of the contribution of bonds to a pairing
 };
 
 class CarriedTracks {
@@ -51,9 +50,9 @@ class CarriedTracks {
             std::vector<Candidate>& out, FrameStats& stats, std::int64_t n_open = 0) {
     live.predict_all(step);
     out.clear();
-    // Bonds can raise a gain by up to the weight, so the threshold is lowered by it.
+    // Bonds can raise a gain, so the threshold is lowered.
     const auto list = [&](auto&& is_selected, std::vector<Candidate>& to) {
-      live.list(time, points, min_gain - opt_.bond_weight, is_selected, min_log_likelihood, gain,
+      live.list(time, points, opt_.is_on ? min_gain - kReach : min_gain, is_selected, min_log_likelihood, gain,
                 to);
     };
     if (!opt_.is_on) return list([](std::size_t) { return true; }, out);
@@ -131,6 +130,7 @@ class CarriedTracks {
 
  private:
   static constexpr double kNever = -std::numeric_limits<double>::infinity();
+  static constexpr double kReach = 2;  // nats below the threshold where bonds may list a candidate
   // A position is uncertain if its standard deviation exceeds this fraction of the distance to the
   // nearest neighbour.
   static constexpr double kUncertain = 0.25;
@@ -202,7 +202,7 @@ class CarriedTracks {
   void add_alone(std::vector<Candidate>& out) {
     s_.added.clear();
     for (const Candidate& own : s_.alone) {
-      if (!(own.gain + opt_.bond_weight > s_.ghosts[own.row])) continue;
+      if (!(own.gain + kReach > s_.ghosts[own.row])) continue;
       const std::size_t same = find_same(out, own);
       if (same == out.size())
         s_.added.push_back(own);
@@ -223,13 +223,13 @@ class CarriedTracks {
     }
     const auto is_ambiguous = [&](const Candidate& c) {
       return s_.n_rows[c.column] > 1 || s_.n_columns[c.row] > 1 ||
-             c.gain - opt_.bond_weight <= min_gain;
+             c.gain - kReach <= min_gain;
     };
     s_.bond_gains.clear();
     for (Candidate& c : out) {
       if (!live[c.row].is_confirmed()) continue;
       const bool was_listed = c.gain > min_gain;
-      if (opt_.bond_weight > 0 && is_ambiguous(c)) {
+      if (is_ambiguous(c)) {
         s_.bond_gains.push_back({c.row, c.column, s_.joint.gain(c.row, points[c.column])});
         c.gain += s_.bond_gains.back().nats;
       }

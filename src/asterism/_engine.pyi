@@ -175,8 +175,22 @@ class _Tracker:
 
 class CarryOptions:
     def __init__(
-        self, *, is_on: bool = False, max_carried: int = 0, bond_weight: float = 0.0
+        self, *, is_on: bool = False, max_carried: int = 0
     ) -> None: ...
+
+def decide_jointly(
+    *,
+    centers: Floats,
+    track_variances: Floats,
+    ends: Ints,
+    n: Ints,
+    means: Floats,
+    variances: Floats,
+    points: Floats,
+    rows: Ints,
+    columns: Ints,
+    gains: Floats,
+) -> Ints: ...
 
 class RigidCarrier:
     def __init__(self, *, n_axes: int, noise_sigma: float) -> None: ...

@@ -112,11 +112,11 @@ def test_rigid_bodies_are_options_of_the_methods_that_have_them():
         given = parsed("--option", "gnn", texts, options)
         return am.tracking.method_by_name("gnn", **nested(given, options))
 
-    rigid = am.tracking.Rigidity(max_gap=30, bond_weight=0.0)
+    rigid = am.tracking.Rigidity(max_gap=30)
     assert made("rigid=yes") == am.GNN(rigid=am.tracking.Rigidity())
     assert made("rigid=no") == made() == am.GNN()
-    assert made("rigid.max-gap=30", "rigid.bond_weight=0") == am.GNN(rigid=rigid)
-    assert made("rigid=yes", "rigid.max-gap=30", "rigid.bond_weight=0") == am.GNN(rigid=rigid)
+    assert made("rigid.max-gap=30") == am.GNN(rigid=rigid)
+    assert made("rigid=yes", "rigid.max-gap=30") == am.GNN(rigid=rigid)
     with pytest.raises(ParameterError, match=r"rigid: expected true, as rigid.max_gap is given"):
         made("rigid=no", "rigid.max_gap=30")
     assert flat(nested({"rigid.max_gap": 3, "a": 1}, options)) == {"rigid.max_gap": 3, "a": 1}

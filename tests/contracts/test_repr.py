@@ -83,7 +83,7 @@ def instances():
     changed = {
         "gate": am.tracking.Gate(probability=1.23456789e-7),
         "lifecycle": am.tracking.Lifecycle(confirm_probability=0.987654, delete_odds=1e5 / 3),
-        "rigid": am.tracking.Rigidity(max_gap=12345, bond_weight=10 / 3),
+        "rigid": am.tracking.Rigidity(max_gap=12345),
         "window": 5, "max_states": 777,
         "prune_odds": 1e5 / 3, "new_track_odds": 1e5 / 3, "max_hypotheses": 77,
         "merged_within": 1 / 30, "guard": False,

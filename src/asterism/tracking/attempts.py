@@ -15,7 +15,8 @@ import numpy as np
 from asterism.records import record
 from asterism.tracking.confidence import assess
 from asterism.tracking.confidence.identity import OTHER_JOIN
-from asterism.tracking.methods import METHODS, TOMHT, method_by_name, options_of
+from asterism.tracking.estimation import fit_body_motion
+from asterism.tracking.methods import METHODS, TOMHT, Rigidity, method_by_name, options_of
 from asterism.tracking.methods.associate import associate
 from asterism.tracking.naming import learn_marker_set, name_tracks
 from asterism.tracking.stitching import stitch, tracklet_model
@@ -129,8 +130,10 @@ def most_certain(
 ) -> Uncorrected:
     """Make attempts while identities are uncertain, and return the most certain result.
 
-    The first is by the method of the recipe, the second by `TOMHT`. Then
-    `refined_by_own_distances` follows. For `progress`, a frame of each method counts as half.
+    The first is by the method of the recipe, the second by `TOMHT`. The third is by `TOMHT` with
+    `Rigidity` and the motion of `fit_body_motion`. It must be more certain by `DOUBTFUL`, because
+    it uses distances as the confidence does. `refined_by_own_distances` follows. For `progress`,
+    the first method is half of the work.
 
     Parameters
     ----------
@@ -146,19 +149,26 @@ def most_certain(
     best = attempt(
         recipe, detections, method, start=start, progress=lambda done: advance(done // 2)
     )
-    if best.is_doubtful and recipe.method != TOMHT.name:
-        other = _by_tomht(recipe, detections, lambda done: advance((n + done) // 2))
-        if other.expected_right > best.expected_right:
-            best = _with_reason(other, best)
+    if recipe.method != TOMHT.name:  # else the recipe is that of a further attempt
+        if best.is_doubtful:
+            other = _by(TOMHT(), recipe, detections, lambda done: advance((2 * n + done) // 4))
+            if other.expected_right > best.expected_right:
+                best = _with_reason(other, best)
+        if best.is_doubtful and (model := fit_body_motion(detections, recipe.model)) is not None:
+            rigid = dataclasses.replace(recipe, model=model)
+            other = _by(
+                TOMHT(rigid=Rigidity()), rigid, detections, lambda done: advance((3 * n + done) // 4)
+            )
+            if other.expected_right > best.expected_right + DOUBTFUL * detections.n_points:
+                best = _with_reason(other, best)
     best = refined_by_own_distances(best)
     advance(n)
     return best
 
 
-def _by_tomht(
-    recipe: Recipe, detections: Detections, progress: Callable[[int], Any]
+def _by(
+    method: TOMHT, recipe: Recipe, detections: Detections, progress: Callable[[int], Any]
 ) -> Uncorrected:
-    method = TOMHT()
     recipe = dataclasses.replace(recipe, method=method.name, options=options_of(method))
     return attempt(recipe, detections, method, progress=progress)
 

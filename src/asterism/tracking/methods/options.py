@@ -91,20 +91,17 @@ class Lifecycle:
 
 @record
 class Rigidity:
-    """Prediction of occluded markers by neighbours at stable distances, frame by frame.
+    """Association and prediction by neighbours at stable distances, frame by frame.
 
-    Stable distances are estimated while both markers are detected. An occluded track is predicted
-    by a rigid fit of its neighbours, also beyond the model's `max_gap`. A detection that disagrees
-    with the neighbours has a lower likelihood.
+    Stable distances are estimated while both markers are detected. Which detections the markers
+    of a body have is decided jointly by these distances. An occluded track is predicted by a rigid
+    fit of its neighbours, also beyond the model's `max_gap`.
 
     Parameters
     ----------
     max_gap : int
         Longest occlusion through which neighbours predict a track, frames, 1 to 100000. Beyond it
         the model's `max_gap` applies. Larger values keep tracks through longer occlusions.
-    bond_weight : float
-        Largest effect of the neighbours on an ambiguous pairing, nats, 0 to 100. At 0 they only
-        predict occluded tracks. The default of 2 can reverse likelihood ratios up to e² ≈ 7.
 
     Examples
     --------
@@ -114,14 +111,12 @@ class Rigidity:
     """
 
     max_gap: int = 60
-    bond_weight: float = 2.0
 
     def __post_init__(self) -> None:
         max_frames = 100_000
         check_number(
             "rigid.max_gap", self.max_gap, above=1, below=max_frames, closed=True, integer=True
         )
-        check_number("rigid.bond_weight", self.bond_weight, above=0, below=100, closed=True)
 
 
 class SharedOptions(Protocol):
@@ -258,9 +253,7 @@ def carry_options(rigid: Rigidity | None) -> _engine.CarryOptions:
 
     if rigid is None:
         return _engine.CarryOptions()
-    return _engine.CarryOptions(
-        is_on=True, max_carried=int(rigid.max_gap), bond_weight=float(rigid.bond_weight)
-    )
+    return _engine.CarryOptions(is_on=True, max_carried=int(rigid.max_gap))
 
 
 def shared_counts(options: SharedOptions, stats: _engine.FrameStats) -> dict[str, float]:

@@ -1,0 +1,85 @@
+"""The motion of markers on bodies, fitted to tracks that bonds hold together."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING
+
+from asterism.model import DWNA, InteractingMotions
+from asterism.tracking.estimation.estimate import MIN_NOISE, WIDER
+from asterism.tracking.estimation.fitted_motion import MotionFit
+from asterism.tracking.estimation.motion_fit import FitBounds, fit_motion
+from asterism.tracking.methods.associate import associate
+from asterism.tracking.methods.gnn import GNN
+from asterism.tracking.methods.options import Rigidity
+
+if TYPE_CHECKING:
+    from asterism.model import Detections, TrackingModel
+
+__all__ = ["fit_body_motion"]
+
+N_FITS = 2
+"""Number of fits, each to tracks found with the one before."""
+BETWEEN = 10.0
+"""Ratio of the strongest to the weakest motion at the start, where a model has one motion."""
+
+
+def fit_body_motion(detections: Detections, model: TrackingModel) -> TrackingModel | None:
+    """Fit noise and motion of a model to tracks of markers on bodies, by `GNN` with `Rigidity`.
+
+    `estimate_model` admits no acceleration by which a marker could reach its neighbour, because it
+    could not tell it from a wrong link, and explains faster motion as noise. Bonds between markers
+    tell them apart, so that there is no such bound here.
+
+    Parameters
+    ----------
+    detections : Detections
+        Capture.
+    model : TrackingModel
+        Estimated model.
+
+    Returns
+    -------
+    TrackingModel or None
+        Model with three motions; None if the markers move in random walks.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> from asterism.tracking.estimation import fit_body_motion
+    >>> truth = am.simulate.person(frames=100, seed=1)
+    >>> model = am.estimate_model(truth.detections).model
+    >>> len(fit_body_motion(truth.detections, model).motion.models)
+    3
+    """
+    fit = _start(model)
+    if fit is None:
+        return None
+    wide = (*fit.levels[:-1], WIDER * fit.levels[-1])
+    n_axes = detections.n_axes
+    fitted = _with(model, dataclasses.replace(fit, noise=MIN_NOISE, levels=wide), n_axes)
+    bounds = FitBounds(min_noise=MIN_NOISE, max_acceleration=math.inf)
+    method = GNN(rigid=Rigidity())
+    for _ in range(N_FITS):
+        tracks = associate(method, detections, fitted, score=False)
+        fit = fit_motion(tracks, fitted, fit, bounds, refine=True)
+        fitted = _with(model, fit, n_axes)
+    return fitted
+
+
+def _start(model: TrackingModel) -> MotionFit | None:
+    motion = model.motion
+    motions = motion.models if isinstance(motion, InteractingMotions) else (motion,)
+    levels = [each.acceleration_sigma for each in motions if isinstance(each, DWNA)]
+    if len(levels) != len(motions):
+        return None
+    if len(levels) == 1:
+        levels = [levels[0] / BETWEEN, levels[0] / math.sqrt(BETWEEN), levels[0]]
+    return MotionFit(noise=model.sensor.noise_sigma, levels=tuple(levels), stay=0.95)
+
+
+def _with(model: TrackingModel, fit: MotionFit, n_axes: int) -> TrackingModel:
+    velocity = model.velocity_sigma(n_axes)
+    sensor = dataclasses.replace(model.sensor, noise_sigma=fit.noise)
+    return dataclasses.replace(model, motion=fit.motion(velocity), sensor=sensor)
