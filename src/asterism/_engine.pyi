@@ -174,9 +174,7 @@ class _Tracker:
     total: Final[FrameStats]
 
 class CarryOptions:
-    def __init__(
-        self, *, is_on: bool = False, max_carried: int = 0
-    ) -> None: ...
+    def __init__(self, *, is_on: bool = False, max_carried: int = 0) -> None: ...
 
 def decide_jointly(
     *,

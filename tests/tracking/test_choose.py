@@ -117,12 +117,13 @@ def test_a_recipe_repeats_what_was_kept(fast):
 
 
 def test_parts_that_moved_by_their_own_distances_are_joins():
-    walk = am.simulate.person(activity="walk", frames=300, seed=14)
-    truth = am.simulate.corrupt(walk, missing=0.1, clutter=0.1, noise=3e-4, stride=4, seed=14)
+    run = am.simulate.person(activity="run", frames=300, seed=14)
+    truth = am.simulate.corrupt(run, missing=0.1, clutter=0.1, noise=3e-4, stride=4, seed=14)
     tracks = am.track(truth.detections)
     assert tracks.info["refinements"] > 0
     model = am.tracking.tracklet_model(tracks.recipe.model)
-    tracklets = am.track(truth.detections, am.TOMHT(), model=model, seed=0)
+    method = am.tracking.method_by_name(tracks.recipe.method, **tracks.recipe.options)
+    tracklets = am.track(truth.detections, method, model=model, seed=0)
     before = am.stitch(tracklets, model).tracks
     order, offsets = before.by_track
     then = np.split(tracks.labels[order], offsets[1:-1])
@@ -135,6 +136,22 @@ def test_parts_that_moved_by_their_own_distances_are_joins():
         own = np.flatnonzero(tracks.labels == k)
         begins = own[1:][np.diff(np.isin(own, moved).astype(int)) != 0]
         assert {(k, each) for each in truth.detections.frame_of[begins]} <= joins
+
+
+def test_bonds_track_fast_motion_at_a_low_rate():
+    run = am.simulate.person(activity="run", frames=600, seed=11)
+    truth = am.simulate.corrupt(run, missing=0.1, clutter=0.1, noise=3e-4, stride=2, seed=11)
+    tracks = am.track(truth.detections)
+    assert (tracks.recipe.method, "rigid" in str(tracks.recipe.options)) == ("tomht", True)
+    motion = am.estimate_model(truth.detections).model.motion
+    assert tracks.recipe.model.motion.models[-1].acceleration_sigma > 2 * max(
+        each.acceleration_sigma for each in getattr(motion, "models", (motion,))
+    )
+    assert am.evaluate(tracks, truth).idf1 > 0.99
+    alone = am.track(truth.detections, am.TOMHT(), stitch=True)
+    assert am.evaluate(alone, truth).idf1 < 0.95
+    again = am.tracking.carry_out(tracks.recipe, truth.detections).tracks
+    assert np.array_equal(again.labels, tracks.labels)
 
 
 def test_the_progress_of_both_methods_is_one(fast):

@@ -149,18 +149,13 @@ def most_certain(
     best = attempt(
         recipe, detections, method, start=start, progress=lambda done: advance(done // 2)
     )
-    if recipe.method != TOMHT.name:  # else the recipe is that of a further attempt
-        if best.is_doubtful:
-            other = _by(TOMHT(), recipe, detections, lambda done: advance((2 * n + done) // 4))
-            if other.expected_right > best.expected_right:
-                best = _with_reason(other, best)
+    if best.is_doubtful and recipe.method != TOMHT.name:  # else it is that of a further attempt
+        other = _by(TOMHT(), recipe, detections, lambda done: advance((2 * n + done) // 4))
+        best = _more_certain(best, other, 0)
         if best.is_doubtful and (model := fit_body_motion(detections, recipe.model)) is not None:
-            rigid = dataclasses.replace(recipe, model=model)
-            other = _by(
-                TOMHT(rigid=Rigidity()), rigid, detections, lambda done: advance((3 * n + done) // 4)
-            )
-            if other.expected_right > best.expected_right + DOUBTFUL * detections.n_points:
-                best = _with_reason(other, best)
+            bodies, method = dataclasses.replace(recipe, model=model), TOMHT(rigid=Rigidity())
+            other = _by(method, bodies, detections, lambda done: advance((3 * n + done) // 4))
+            best = _more_certain(best, other, DOUBTFUL * detections.n_points)
     best = refined_by_own_distances(best)
     advance(n)
     return best
@@ -173,8 +168,10 @@ def _by(
     return attempt(recipe, detections, method, progress=progress)
 
 
-def _with_reason(other: Uncorrected, before: Uncorrected) -> Uncorrected:
-    """Return a result whose recipe states why it is better than that of another method."""
+def _more_certain(before: Uncorrected, other: Uncorrected, margin: float) -> Uncorrected:
+    """Return the other result with the reason, if it is more certain by a number of detections."""
+    if other.expected_right <= before.expected_right + margin:
+        return before
     share, less = (100 * each.expected_right / len(each.tracks.labels) for each in (other, before))
     reason = (
         f"{before.recipe.reason}; {share:.1f} % of the detections are expected to have the right "
