@@ -64,6 +64,7 @@ class JointPlaces {
     std::ranges::sort(links_, {}, [](const Link& link) { return std::tuple(link.a, link.b, link.V); });
     const auto same = [](const Link& x, const Link& y) { return x.a == y.a && x.b == y.b; };
     links_.erase(std::ranges::unique(links_, same).begin(), links_.end());
+    for (Link& link : links_) expect(link);
     of_track_.assign(tracks_.size(), {});
     for (std::int32_t e = 0; e < static_cast<std::int32_t>(links_.size()); ++e) {
       of_track_[links_[e].a].push_back(e);
@@ -128,7 +129,7 @@ class JointPlaces {
 
   struct Link {
     std::int32_t a = 0, b = 0;  // tracks, a < b
-    double distance = 0, V = 0, base = 0;
+    double distance = 0, V = 0, ratio = 0;
     std::size_t effects = 0, to_a = 0, to_b = 0;  // where those begin in the arrays of a frame
     bool operator<(const Link& other) const {
       return std::tuple(V, a, b) < std::tuple(other.V, other.a, other.b);
@@ -143,20 +144,26 @@ class JointPlaces {
     Link link{std::min(a, b), std::max(a, b), bond.mean};
     const double n = static_cast<double>(std::min(bond.n, kMemory)), prior = kSteady * bond.mean;
     link.V = (n * bond.variance + prior * prior * kPriorFrames) / (n + kPriorFrames);
-    const double spread = link.V + tracks_[a].variance + tracks_[b].variance;
-    const double off = distance(tracks_[a].center, tracks_[b].center) - bond.mean;
-    link.base = 0.5 * std::log(spread / link.V) + log_tail(off, spread);
     return link;
   }
   double distance(const Point& x, const Point& y) const {
     return std::sqrt(squared_distance(x, y, D_));
   }
-  static double log_tail(double off, double variance) {
-    return 0.5 * (kFreedom + 1) * std::log1p(off * off / (kFreedom * variance));
+  // Sets the square of the likelihood ratio of the bond's own distance.
+  void expect(Link& link) const {
+    const Track &a = tracks_[link.a], &b = tracks_[link.b];
+    const double spread = link.V + a.variance + b.variance;
+    const double off = distance(a.center, b.center) - link.distance;
+    link.ratio = spread / link.V * tail(off, spread);
+  }
+  // Density of t at the mean over that at `off`, squared: (1 + x² / ν s²)^(ν + 1).
+  static double tail(double off, double variance) {
+    const double base = 1 + off * off / (kFreedom * variance);
+    return base * base * base * base * base;
   }
   double effect(const Link& link, const Point& x, const Point& y) const {
     const double off = distance(x, y) - link.distance;
-    return std::clamp(link.base - log_tail(off, link.V), kLeast, kMost);
+    return std::clamp(0.5 * std::log(link.ratio / tail(off, link.V)), kLeast, kMost);
   }
   std::size_t n_of(std::int32_t a) const { return first_[a + 1] - first_[a]; }
 
