@@ -65,7 +65,7 @@ def test_two_markers_in_one_place_are_no_switch():
 def test_no_label_of_simulated_people_is_found_wrong():
     made = am.simulate.person(activity="run", frames=300, seed=31)
     truth = am.simulate.corrupt(made, missing=0.1, clutter=0.1, noise=3e-4, stride=3, seed=31)
-    runs = wrong_runs(am.track(truth.detections), truth)
+    runs = wrong_runs(am.track(truth.detections, am.GNN(), stitch=True), truth)
     kinds = [run.kind for run in runs]
     assert kinds.count("switch") > 20
     assert "label error" not in kinds
