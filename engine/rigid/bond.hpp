@@ -24,8 +24,6 @@ inline constexpr double kBend = 0.01;  // expected deformation as a fraction of 
 inline constexpr std::int64_t kMinTogether = 20;  // frames until a distance may be a bond
 inline constexpr double kSteady = 0.1;          // largest √V of a bond as a fraction of its length
 inline constexpr std::size_t kSteadiest = 6;    // number of bonds used for a marker
-// Deviation in √V above which a distance is evidence against a bond.
-inline constexpr double kFar = 2;
 
 // 1/n for the first kMemory numbers, because a division for each bond and frame takes long.
 inline constexpr auto kShares = [] {
@@ -59,14 +57,6 @@ inline double predictive_variance(const Bond& bond, double r) {
 inline bool is_bond(const Bond& bond, double r) {
   const double max_deviation = kSteady * bond.mean;
   return bond.n >= kMinTogether && predictive_variance(bond, r) <= max_deviation * max_deviation;
-}
-
-// Evidence of a distance for the two markers of the bond: 1 at the mean distance, falling to -1 for
-// large deviations. It is bounded, so that a single outlier cannot dominate a sum.
-inline double agreement(const Bond& bond, double r, double distance) {
-  const double off = distance - bond.mean;
-  const double z2 = off * off / (kFar * kFar * predictive_variance(bond, r));
-  return (1 - z2) / (1 + z2);
 }
 
 }  // namespace asterism

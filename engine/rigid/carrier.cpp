@@ -65,16 +65,6 @@ bool RigidCarrier::carry(std::int32_t marker, const Places& now, Carriage& out,
   return true;
 }
 
-std::span<const Bond> RigidCarrier::bonds(std::int32_t marker) {
-  s_.bonds.clear();
-  for (const Bond& bond : carrier_.neighbours(marker))
-    if (is_bond(bond, noise())) s_.bonds.push_back(bond);
-  std::ranges::sort(s_.bonds, {}, [&](const Bond& bond) {
-    return std::pair(predictive_variance(bond, noise()), bond.other);
-  });
-  return s_.bonds;
-}
-
 std::int64_t RigidCarrier::n_bonds(std::int32_t marker) const {
   return std::ranges::count_if(carrier_.neighbours(marker), [&](const Bond& bond) {
     return bond.other > marker && is_bond(bond, noise());

@@ -210,10 +210,8 @@ class RigidCarrier {
   // occluded since.
   bool carry(std::int32_t marker, const Places& now, Carriage& out, std::int64_t n_open = 0);
 
-  // All distances known of a marker.
-  std::span<const Bond> known(std::int32_t marker) const { return carrier_.neighbours(marker); }
-  // The bonds of a marker, by increasing predictive variance.
-  std::span<const Bond> bonds(std::int32_t marker);
+  // All distances known of a marker, whether they are bonds or not.
+  std::span<const Bond> distances(std::int32_t marker) const { return carrier_.neighbours(marker); }
   // The number of bonds of a marker to markers of larger number, so that each pair is counted once.
   std::int64_t n_bonds(std::int32_t marker) const;
 
@@ -231,7 +229,6 @@ class RigidCarrier {
   void remember(std::int32_t marker, std::int64_t back, std::vector<Anchor>& anchors);
 
   struct Memory {
-    std::vector<Bond> bonds;
     std::vector<Carriage> ways;
     std::vector<Anchor> anchors;
   };

@@ -150,7 +150,7 @@ class CarriedTracks {
                            prediction.variance()});
     }
     s_.joint.begin(s_.tracks, live.size(), carrier_.n_axes(),
-                   [&](std::int32_t marker) { return carrier_.known(marker); });
+                   [&](std::int32_t marker) { return carrier_.distances(marker); });
     std::erase_if(s_.all, [&](const Candidate& c) { return !live[c.row].is_confirmed(); });
     std::ranges::stable_sort(s_.all, {}, &Candidate::row);
     s_.joint.decide(points, s_.all);
