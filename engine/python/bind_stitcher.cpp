@@ -147,10 +147,11 @@ nb::tuple exchanged_stretches(const MotionModel& m, const In<double>& times,
   std::vector<ExchangedStretch> found;
   {
     nb::gil_scoped_release release;
-    DistanceExchanges search(m, line, p_detection, noise);
+    UsualDistances distances(static_cast<std::int64_t>(line.times.size()), m.axis.D);
     for (std::size_t k = 0; k < tracks.n_tracks(); ++k)
-      search.add(tracks.points_of(k), tracks.frames_of(k));
-    found = search.find(examined);
+      distances.add(tracks.points_of(k), tracks.frames_of(k));
+    distances.measure();
+    found = stretches_of_pairs(distances, m, line, p_detection, noise, examined);
   }
   Owned<std::int64_t> own(2 * found.size()), stretch(2 * found.size());
   for (std::size_t i = 0; i < found.size(); ++i) {
