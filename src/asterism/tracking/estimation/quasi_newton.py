@@ -64,18 +64,17 @@ def maximise(
     (array([0.3, 1.5]), -12.5)
     """
     n = len(start)
-    nearby = NEAR * np.vstack([np.eye(n), -np.eye(n)])
+    nearby = NEAR * np.vstack([np.zeros(n), np.eye(n), -np.eye(n)])
 
-    def value_at(x: NDArray[np.float64]) -> float:
-        return float(log_likelihoods(x[None])[0])
-
-    def around(x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the values above and below along each parameter."""
+    def values_around(
+        x: NDArray[np.float64],
+    ) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
+        """Return the value at x, and those above and below along each parameter."""
         found = np.asarray(log_likelihoods(x + nearby))
-        return found[:n], found[n:]
+        return float(found[0]), found[1 : n + 1], found[n + 1 :]
 
     x = np.clip(start, low, high)
-    value, (up, down) = value_at(x), around(x)
+    value, up, down = values_around(x)
     gradient = (up - down) / (2 * NEAR)
     along = (2 * value - up - down) / NEAR**2
     curvature = np.diag(np.maximum(np.abs(along), MIN_CURVATURE))
@@ -91,12 +90,12 @@ def maximise(
         step *= min(1.0, MAX_STEP / float(np.abs(step).max()))
         for _ in range(MAX_HALVINGS):
             following = np.minimum(np.maximum(x + step, low), high)
-            if (reached := value_at(following)) > value:
+            reached, up, down = values_around(following)
+            if reached > value:
                 break
             step /= 2
         else:
             break
-        up, down = around(following)
         slope = (up - down) / (2 * NEAR)
         _update(curvature, following - x, gradient - slope)
         x, value, gradient = following, reached, slope
