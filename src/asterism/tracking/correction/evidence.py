@@ -12,6 +12,8 @@ from asterism.tracking.confidence.parts import PART_FRAMES
 from asterism.tracking.rigidity.profiles import candidate_densities, learn_profiles
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from asterism.model import TrackingModel, Tracks
@@ -55,9 +57,9 @@ class Evidence:
             self.part_of[is_ghost] = n + numbers
 
     def gains(
-        self, detections: NDArray[np.int64], labels: NDArray[np.int64], then: int
+        self, detections: NDArray[np.int64], labels: NDArray[np.int64], others: Sequence[int]
     ) -> NDArray[np.float64]:
-        """Return the log odds that each detection of a track gains in another track.
+        """Return the log odds that each detection of a track gains in other tracks.
 
         Those of a part are shared by its detections.
 
@@ -67,16 +69,22 @@ class Evidence:
             Detections of one track, in time order.
         labels : ndarray of int, shape (N,)
             Track of each detection now.
-        then : int
-            Other track; one without detections is an unknown marker.
+        others : sequence of int
+            K other tracks; one without detections is an unknown marker.
+
+        Returns
+        -------
+        ndarray of shape (K, n)
         """
         if not len(detections):
-            return np.empty(0)
-        others = np.array([then] if (labels == then).any() else [], dtype=np.int64)
-        found, counts = self._densities(detections, labels, others)
-        density, factor = found[:, 0], PART[2] if len(others) else PART[1]
-        gain = factor * np.clip(density, -MARGINS[1], -MARGINS[0])
-        return np.repeat(gain / counts, counts)
+            return np.empty((len(others), 0))
+        is_known = np.array([(labels == k).any() for k in others])
+        known = np.array(others, dtype=np.int64)[is_known]
+        found, counts = self._densities(detections, labels, known)
+        column = np.where(is_known, np.cumsum(is_known) - 1, len(known))
+        factor = np.where(is_known, PART[2], PART[1])[:, None]
+        gain = factor * np.clip(found.T[column], -MARGINS[1], -MARGINS[0])
+        return np.repeat(gain / counts, counts, axis=1)
 
     def best(self, detection: int, labels: NDArray[np.int64], n: int) -> list[int]:
         """Return the `n` other tracks that the part of a detection fits best.
@@ -93,7 +101,8 @@ class Evidence:
         own = np.flatnonzero(
             (self.part_of == self.part_of[detection]) & (labels == labels[detection])
         )
-        others = np.unique(labels[(labels >= 0) & (labels != labels[detection])])
+        others = np.flatnonzero(np.bincount(labels + 1)[1:])
+        others = others[others != labels[detection]]
         found = self._densities(own, labels, others)[0][0, :-1]
         order = np.argsort(-found, kind="stable")
         return [int(others[i]) for i in order if found[i] != 0][:n]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -145,11 +146,12 @@ class Solver:
         found: list[_Solution | None] = []
         later = max(own, key=lambda i: self._d.frame_of[i])
         cut = int(self._d.frame_of[later]) if is_here else None
-        for detection, beside in ((own[0], own[1]), (own[1], own[0])):
-            others = self.evidence.best(detection, self.labels, CANDIDATES)
+        targets = [[*self.evidence.best(i, self.labels, CANDIDATES), len(self.names)] for i in own]
+        lanes = self._lanes(a, list(dict.fromkeys(itertools.chain(*targets))), self.labels)
+        for detection, beside, others in zip(own, reversed(own), targets, strict=True):
             found += [
-                self._solve(detection, a, other, cut, beside=beside)
-                for other in (*others, len(self.names))
+                self._solve(detection, a, other, cut, beside=beside, lanes=lanes[other])
+                for other in others
             ]
         self._carry_out(*found)
         if (self.labels == len(self.names)).any():
@@ -208,36 +210,46 @@ class Solver:
         target: int,
         cut: int | None = None,
         beside: int | None = None,
-        labels: NDArray[np.int64] | None = None,
+        lanes: tuple[Lane, Lane] | None = None,
     ) -> _Solution | None:
-        """Return the gain and the labels with a detection and its group on another track.
+        """Return the gain and the moves that bring a detection and its group to another track.
 
         Detections of other groups stay. The detection `beside` of the same edit stays where it is.
+        The lanes are those of both tracks, by default as the labels are now.
         """
         if not self._may_be(detection, target):
             return None
-        labels = self.labels.copy() if labels is None else labels
+        if lanes is None:
+            lanes = self._lanes(source, [target], self.labels)[target]
         group = self._constraints.group(detection)
-        own = np.array(sorted(self._constraints.pinned | group))
-        is_group = np.isin(own, list(group))
-        stated = np.zeros(len(labels), dtype=np.int8)
-        stated[own] = np.where(is_group & (labels[own] == source), 1, -1)
-        if beside is not None:
-            stated[beside] = -1
-        lanes = (
-            self._lane(source, target, labels, stated),
-            self._lane(target, source, labels, stated),
-        )
+        own = np.array(sorted({*self._constraints.pinned, *group, beside} - {None}))
+        track = self.labels[own]
+        stated = np.where((track == source) & np.isin(own, list(group)) & (own != beside), 1, -1)
+        for lane, k in zip(lanes, (source, target), strict=True):
+            lane.stated[:] = 0
+            lane.stated[np.searchsorted(lane.detections, own[track == k])] = stated[track == k]
         found = best_exchange(lanes, self._motion, cut)
         if found is None:
             return None
-        for lane, then in zip(lanes, (target, source), strict=True):
-            labels[lane.detections[found.inside(lane.frames)]] = then
-        return found.gain, labels
+        return found.gain, [
+            (lane.detections[found.inside(lane.frames)], then)
+            for lane, then in zip(lanes, (target, source), strict=True)
+        ]
 
-    def _lane(
-        self, track: int, other: int, labels: NDArray[np.int64], stated: NDArray[np.int8]
-    ) -> Lane:
+    def _lanes(
+        self, source: int, targets: Sequence[int], labels: NDArray[np.int64]
+    ) -> dict[int, tuple[Lane, Lane]]:
+        """Return the lanes of a track and of each of several others, nothing stated."""
+        out = self._track_lanes(source, targets, labels)
+        return {
+            target: (lane, *self._track_lanes(target, [source], labels))
+            for target, lane in zip(targets, out, strict=True)
+        }
+
+    def _track_lanes(
+        self, track: int, others: Sequence[int], labels: NDArray[np.int64]
+    ) -> list[Lane]:
+        """Return the lane of a track for an exchange with each of several others."""
         evidence, own = self.evidence, np.flatnonzero(labels == track)
         parts = evidence.part_of[own]
         starts = np.ones(len(own), dtype=bool)
@@ -245,43 +257,40 @@ class Solver:
         before = np.ones(len(own))
         known = starts & (parts >= 0) & (parts < len(evidence.before))
         before[known] = evidence.before[parts[known]]
-        return Lane(
-            detections=own,
-            frames=self._d.frame_of[own],
-            gains=(
-                np.full(len(own), TRACKED if track == CLUTTER else -TRACKED)
-                if CLUTTER in (track, other)
-                else evidence.gains(own, labels, other)
-            ),
-            starts=starts,
-            before=before,
-            stated=stated[own],
+        gains = (
+            np.full((len(others), len(own)), TRACKED if track == CLUTTER else -TRACKED)
+            if CLUTTER in (track, *others)
+            else evidence.gains(own, labels, others)
         )
+        return [
+            Lane(
+                detections=own, frames=self._d.frame_of[own], gains=gain, starts=starts,
+                before=before, stated=np.zeros(len(own), dtype=np.int8),
+            )
+            for gain in gains
+        ]  # fmt: skip
 
     def _carry_out(self, *solutions: _Solution | None) -> None:
-        """Take the labels with the largest gain."""
+        """Make the moves with the largest gain."""
         found = [each for each in solutions if each is not None]
         if not found:
             raise NoSolution
-        self.labels = max(found, key=lambda each: each[0])[1]
+        for detections, track in max(found, key=lambda each: each[0])[1]:
+            self.labels[detections] = track
 
     def _take(self, detection: int, target: int, beside: int | None = None) -> None:
         """Bring a detection without a track, and those around that continue it, to a track.
 
         Where the track has a detection in the same frame, both may be exchanged.
         """
-        labels, frame = self.labels.copy(), self._d.frame_of
+        labels, frame = self.labels, self._d.frame_of
         chain = np.array(self._chain(detection, target))
         is_taken = np.isin(frame[chain], frame[labels == target])
         labels[chain[~is_taken]] = target
         if labels[detection] != target:
             labels[chain[is_taken]] = CLUTTER
-            found = self._solve(detection, CLUTTER, target, beside=beside, labels=labels)
-            if found is None:
-                raise NoSolution
-            labels = found[1]
+            self._carry_out(self._solve(detection, CLUTTER, target, beside=beside))
             labels[labels == CLUTTER] = -1  # given for them, or not taken
-        self.labels = labels
 
     def _chain(self, detection: int, target: int) -> list[int]:
         """Return the detections without a track that continue one of them to a track.
@@ -322,4 +331,5 @@ class Solver:
         return chain
 
 
-_Solution = tuple[float, "NDArray[np.int64]"]
+_Solution = tuple[float, list[tuple["NDArray[np.int64]", int]]]
+"""Gain, and the detections that go to each track."""
