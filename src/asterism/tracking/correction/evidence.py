@@ -9,7 +9,7 @@ import numpy as np
 from asterism.tracking.confidence.calibration import MARGINS, PART
 from asterism.tracking.confidence.identity import examine
 from asterism.tracking.confidence.parts import PART_FRAMES
-from asterism.tracking.rigidity.profiles import candidate_densities, learn_profiles
+from asterism.tracking.rigidity.profiles import candidate_margins, learn_profiles
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -112,7 +112,8 @@ class Evidence:
     ) -> NDArray[np.float64]:
         """Return the log odds that single detections are of the marker of a track.
 
-        They are those of a part of one detection that no other track has as an alternative.
+        They are those of a part of one detection, whose alternatives are the tracks without a
+        detection in its frame.
 
         Parameters
         ----------
@@ -128,9 +129,9 @@ class Evidence:
         ndarray of shape (n,)
             Log odds, 0 for a track that keeps no distances.
         """
-        density = candidate_densities(self._detections, labels, self._noise, detections, track)
-        found = PART[0] + PART[1] * np.clip(density, *MARGINS) + PART[2] * MARGINS[1]
-        return np.where(density == 0, 0.0, found)
+        margins = candidate_margins(self._detections, labels, self._noise, detections, track)
+        found = PART[0] + np.clip(margins, *MARGINS) @ PART[1:3]
+        return np.where(margins[:, 0] == 0, 0.0, found)
 
     def _densities(
         self, detections: NDArray[np.int64], labels: NDArray[np.int64], others: NDArray[np.int64]

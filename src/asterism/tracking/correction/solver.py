@@ -29,6 +29,8 @@ TRACKED = 3.0
 """Log odds of a detection that continues a track being of its marker instead of clutter."""
 MAX_SHARED = 0.02
 """Largest share of the frames of a track that a track of the same marker may have too."""
+PROBABLE = float(np.log(4))
+"""Log odds from which a detection without a track is brought to one that an edit is about."""
 IDLE = 50
 """Frames along a track after which no more detections without a track are looked for."""
 MIN_FIT = -40.0
@@ -97,6 +99,8 @@ class Solver:
             self._drop(own[0])
         elif edit.kind == "name":
             self._call(own[0], edit.name)
+        if edit.kind in ("same", "name"):
+            self._collect(int(self.labels[own[0]]))
 
     def _join(self, own: Sequence[int]) -> None:
         """Bring two detections to one track."""
@@ -291,6 +295,22 @@ class Solver:
             labels[chain[is_taken]] = CLUTTER
             self._carry_out(self._solve(detection, CLUTTER, target, beside=beside))
             labels[labels == CLUTTER] = -1  # given for them, or not taken
+
+    def _collect(self, track: int) -> None:
+        """Bring all detections without a track that are probably of the marker of a track to it."""
+        labels, frame, parts = self.labels, self._d.frame_of, self.evidence.part_of
+        is_known = np.zeros(self._d.n_frames, dtype=bool)
+        is_known[frame[labels == track]] = True
+        free = np.flatnonzero(labels < 0)
+        free = free[~np.isin(free, list(self._constraints.clutter))]
+        beside = np.bincount(parts[free] + 1, weights=is_known[frame[free]])
+        beside /= np.maximum(np.bincount(parts[free] + 1), 1)
+        beside[0] = 0  # these are of no tracklet
+        own = free[~is_known[frame[free]] & (beside[parts[free] + 1] <= MAX_SHARED)]
+        odds = self.evidence.log_odds(own, labels, track)
+        own = own[np.argsort(-odds, kind="stable")][: int((odds > PROBABLE).sum())]
+        _, first = np.unique(frame[own], return_index=True)
+        labels[own[first]] = track
 
     def _chain(self, detection: int, target: int) -> list[int]:
         """Return the detections without a track that continue one of them to a track.

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from asterism.model import Detections
 
-__all__ = ["Profiles", "candidate_densities", "learn_profiles"]
+__all__ = ["Profiles", "candidate_margins", "learn_profiles"]
 
 SAMPLES = 160
 """Number of frames from which profiles are learnt."""
@@ -69,14 +69,14 @@ def learn_profiles(
     return Profiles(frames=frames, engine=engine)
 
 
-def candidate_densities(
+def candidate_margins(
     detections: Detections,
     labels: NDArray[np.int64],
     noise_sigma: float,
     candidates: NDArray[np.int64],
     track: int,
 ) -> NDArray[np.float64]:
-    """Return how well the distances of single detections fit a track, shape (n,).
+    """Return how well the distances of single detections fit a track, shape (n, 2).
 
     Parameters
     ----------
@@ -89,8 +89,9 @@ def candidate_densities(
 
     Returns
     -------
-    ndarray of shape (n,)
-        Log densities relative to an unknown marker, 0 for a track that keeps no distances.
+    ndarray of shape (n, 2)
+        Log densities relative to an unknown marker, and to the best other track without a detection
+        in the frame, infinite without one. Both are 0 for a track that keeps no distances.
     """
     d = detections
     samples = _samples(d)
@@ -99,13 +100,21 @@ def candidate_densities(
     rows, offsets = _rows(d, np.concatenate([samples, frame]))
     own, first = labels[rows], offsets[len(samples) : -1]
     own[first + candidates - d.offsets[frame]] = track
+    n, n_tracks = len(candidates), int(labels.max(initial=track)) + 1
     engine = _engine.DistanceProfiles(
         np.ascontiguousarray(d.points[rows]), own, offsets, np.arange(len(samples)),
-        n_tracks=int(labels.max(initial=track)) + 1, noise=noise_sigma,
+        n_tracks=n_tracks, noise=noise_sigma,
     )  # fmt: skip
-    n, none = len(candidates), np.empty(0, dtype=np.int64)
-    at = len(samples) + np.arange(n)
-    return -engine.densities(np.full(n, track), at, np.arange(n + 1), none)[:, 0]
+    is_there = np.zeros((n, n_tracks + 1), dtype=bool)
+    copies = slice(offsets[len(samples)], None)
+    is_there[np.repeat(np.arange(n), d.counts[frame]), own[copies]] = True
+    others = np.flatnonzero(~is_there[:, :-1].all(axis=0))
+    found = engine.densities(
+        np.full(n, track), len(samples) + np.arange(n), np.arange(n + 1), others
+    )
+    of_others = np.where(is_there[:, others] | (found[:, :-1] == 0), -np.inf, found[:, :-1])
+    best = of_others.max(axis=1, initial=-np.inf)
+    return -np.stack([found[:, -1], np.where(found[:, -1] == 0, 0.0, best)], axis=1)
 
 
 def _samples(d: Detections) -> NDArray[np.int64]:
