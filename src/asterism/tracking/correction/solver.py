@@ -31,6 +31,8 @@ MAX_SHARED = 0.02
 """Largest share of the frames of a track that a track of the same marker may have too."""
 PROBABLE = float(np.log(4))
 """Log odds from which a detection without a track is brought to one that an edit is about."""
+MIN_EXTENT = 0.01
+"""Smallest extent of the volume in which clutter is spread, metres."""
 IDLE = 50
 """Frames along a track after which no more detections without a track are looked for."""
 MIN_FIT = -40.0
@@ -73,6 +75,9 @@ class Solver:
         self.labels = tracks.labels.copy()
         self.names = list(tracks.names)
         self._constraints = Constraints(self._d)
+        extent = np.maximum(np.ptp(self._d.points[tracks.labels >= 0], axis=0), MIN_EXTENT)
+        n_clutter = max(int((tracks.labels < 0).sum()), 1)
+        self._log_clutter = float(np.log(n_clutter / self._d.n_frames / np.prod(extent)))
 
     def solve(self, edit: Edit, constraints: Constraints) -> None:
         """Change labels and names so that they respect one more edit.
@@ -297,20 +302,19 @@ class Solver:
             labels[labels == CLUTTER] = -1  # given for them, or not taken
 
     def _collect(self, track: int) -> None:
-        """Bring all detections without a track that are probably of the marker of a track to it."""
-        labels, frame, parts = self.labels, self._d.frame_of, self.evidence.part_of
+        """Bring the detections without a track that probably are of the marker of a track to it."""
+        labels, frame = self.labels, self._d.frame_of
+        free = labels < 0
+        free[list(self._constraints.clutter)] = False
         is_known = np.zeros(self._d.n_frames, dtype=bool)
-        is_known[frame[labels == track]] = True
-        free = np.flatnonzero(labels < 0)
-        free = free[~np.isin(free, list(self._constraints.clutter))]
-        beside = np.bincount(parts[free] + 1, weights=is_known[frame[free]])
-        beside /= np.maximum(np.bincount(parts[free] + 1), 1)
-        beside[0] = 0  # these are of no tracklet
-        own = free[~is_known[frame[free]] & (beside[parts[free] + 1] <= MAX_SHARED)]
-        odds = self.evidence.log_odds(own, labels, track)
-        own = own[np.argsort(-odds, kind="stable")][: int((odds > PROBABLE).sum())]
-        _, first = np.unique(frame[own], return_index=True)
-        labels[own[first]] = track
+        own = np.flatnonzero(labels == track)
+        is_known[frame[own]] = True
+        others = np.flatnonzero(free & ~is_known[frame])
+        odds = self.evidence.log_odds(others, labels, track)
+        odds += self._motion.log_odds(own, others, self._log_clutter) - self.evidence.ghost[others]
+        others = others[np.argsort(-odds, kind="stable")][: int((odds > PROBABLE).sum())]
+        _, first = np.unique(frame[others], return_index=True)
+        labels[others[first]] = track
 
     def _chain(self, detection: int, target: int) -> list[int]:
         """Return the detections without a track that continue one of them to a track.
