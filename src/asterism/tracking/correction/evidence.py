@@ -62,7 +62,11 @@ class Evidence:
             self.ghost[is_ghost] = log_odds(stitching.probabilities[of])
 
     def gains(
-        self, detections: NDArray[np.int64], labels: NDArray[np.int64], others: Sequence[int]
+        self,
+        detections: NDArray[np.int64],
+        parts: NDArray[np.int64],
+        labels: NDArray[np.int64],
+        others: Sequence[int],
     ) -> NDArray[np.float64]:
         """Return the log odds that each detection of a track gains in other tracks.
 
@@ -72,6 +76,8 @@ class Evidence:
         ----------
         detections : ndarray of int, shape (n,)
             Detections of one track, in time order.
+        parts : ndarray of int, shape (n,)
+            Their parts.
         labels : ndarray of int, shape (N,)
             Track of each detection now.
         others : sequence of int
@@ -85,7 +91,7 @@ class Evidence:
             return np.empty((len(others), 0))
         is_known = np.array([(labels == k).any() for k in others])
         known = np.array(others, dtype=np.int64)[is_known]
-        found, counts = self._densities(detections, labels, known)
+        found, counts = self._densities(detections, parts, labels, known)
         column = np.where(is_known, np.cumsum(is_known) - 1, len(known))
         factor = np.where(is_known, PART[2], PART[1])[:, None]
         gain = factor * np.clip(found.T[column], -MARGINS[1], -MARGINS[0])
@@ -108,7 +114,7 @@ class Evidence:
         )
         others = np.flatnonzero(np.bincount(labels + 1)[1:])
         others = others[others != labels[detection]]
-        found = self._densities(own, labels, others)[0][0, :-1]
+        found = self._densities(own, self.part_of[own], labels, others)[0][0, :-1]
         order = np.argsort(-found, kind="stable")
         return [int(others[i]) for i in order if found[i] != 0][:n]
 
@@ -139,10 +145,14 @@ class Evidence:
         return np.where(margins[:, 0] == 0, 0.0, found)
 
     def _densities(
-        self, detections: NDArray[np.int64], labels: NDArray[np.int64], others: NDArray[np.int64]
+        self,
+        detections: NDArray[np.int64],
+        parts: NDArray[np.int64],
+        labels: NDArray[np.int64],
+        others: NDArray[np.int64],
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Return the log densities of the parts of a track, and the lengths of the parts."""
-        d, parts = self._detections, self.part_of[detections]
+        d = self._detections
         starts = np.flatnonzero(np.concatenate([[True], parts[1:] != parts[:-1]]))
         lengths = np.diff(np.append(starts, len(parts)))
         counts = np.minimum(lengths, PART_FRAMES)

@@ -230,6 +230,9 @@ class Solver:
             return None
         if lanes is None:
             lanes = self._lanes(source, [target], self.labels)[target]
+            if source != CLUTTER and self._is_in_mixed_part(detection, lanes[0], target):
+                part = int(self.evidence.part_of[detection])
+                lanes = self._track_lanes(source, [target], self.labels, part)[0], lanes[1]
         group = self._constraints.group(detection)
         own = np.array(sorted({*self._constraints.pinned, *group, beside} - {None}))
         track = self.labels[own]
@@ -245,6 +248,15 @@ class Solver:
             for lane, then in zip(lanes, (target, source), strict=True)
         ]
 
+    def _is_in_mixed_part(self, detection: int, lane: Lane, target: int) -> bool:
+        """Return whether a detection fits another track that its part does not fit."""
+        parts = self.evidence.part_of
+        part = parts[detection]
+        if lane.gains[parts[lane.detections] == part].sum() >= 0:
+            return False
+        own = np.array([detection])
+        return bool(self.evidence.gains(own, part[None], self.labels, [target])[0, 0] > 0)
+
     def _lanes(
         self, source: int, targets: Sequence[int], labels: NDArray[np.int64]
     ) -> dict[int, tuple[Lane, Lane]]:
@@ -256,11 +268,21 @@ class Solver:
         }
 
     def _track_lanes(
-        self, track: int, others: Sequence[int], labels: NDArray[np.int64]
+        self,
+        track: int,
+        others: Sequence[int],
+        labels: NDArray[np.int64],
+        mixed: int | None = None,
     ) -> list[Lane]:
-        """Return the lane of a track for an exchange with each of several others."""
+        """Return the lane of a track for an exchange with each of several others.
+
+        Each detection of a mixed part is a part of its own.
+        """
         evidence, own = self.evidence, np.flatnonzero(labels == track)
         parts = evidence.part_of[own]
+        if mixed is not None:
+            inside = np.flatnonzero(parts == mixed)
+            parts[inside[1:]] = -1 - np.arange(1, len(inside))
         starts = np.ones(len(own), dtype=bool)
         starts[1:] = parts[1:] != parts[:-1]
         before = np.ones(len(own))
@@ -269,7 +291,7 @@ class Solver:
         gains = (
             np.full((len(others), len(own)), TRACKED if track == CLUTTER else -TRACKED)
             if CLUTTER in (track, *others)
-            else evidence.gains(own, labels, others)
+            else evidence.gains(own, parts, labels, others)
         )
         return [
             Lane(
