@@ -27,12 +27,8 @@ class Evidence:
 
     Parameters
     ----------
-    tracks : Tracks
-        Tracks before any edit.
-    model : TrackingModel
-        Model of motion and noise with which they were tracked.
-    stitching : Stitching, optional
-        Stitching that made the tracks.
+    tracks, model, stitching
+        As for `Correction`.
 
     Attributes
     ----------

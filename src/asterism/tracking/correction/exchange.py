@@ -26,6 +26,8 @@ FARTHEST = 12.0
 """Largest deviation of a link from straight motion that is counted, in log-likelihood units."""
 MAX_ODDS = 2.0
 """Largest log odds by straight motion alone, which markers that accelerate do not keep to."""
+MIN_EXTENT = 0.01
+"""Smallest extent of the volume in which clutter is spread, metres."""
 WINDOW = 64
 """Number of frames around a cut in which the filter looks for detections."""
 BEGIN = -6.0
@@ -99,12 +101,15 @@ class Motion:
 
     def __init__(self, detections: Detections, model: TrackingModel) -> None:
         self._d, self._frame = detections, detections.frame_of
+        y = detections.points
         self._steps = kind, _, Q = steps_of(model.motion, detections.times)
         usual = np.bincount(kind[1:]).argmax() if len(kind) > 1 else 0
         self._q = float(Q[usual, Q.shape[1] // 2, 0, 0])
         self._r = 6 * model.sensor.noise_sigma**2
         self.max_gap = model.population.max_gap + 1
         self._model = model
+        corners = [f(axis=0, initial=s) for f, s in ((y.max, -np.inf), (y.min, np.inf))]
+        self._log_volume = float(np.log(np.maximum(corners[0] - corners[1], MIN_EXTENT)).sum())
 
     def ratios(self, lanes: tuple[Lane, Lane], cuts: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the log-likelihood ratios of exchanges of both tails, by the filter of the model.
@@ -164,10 +169,7 @@ class Motion:
         return -(off**2).sum(axis=1) / (2 * factor * (self._r + self._q * abs(n) ** 3))
 
     def log_odds(
-        self,
-        own: NDArray[np.int64],
-        others: NDArray[np.int64],
-        log_clutter: float,
+        self, own: NDArray[np.int64], others: NDArray[np.int64], clutter: float
     ) -> NDArray[np.float64]:
         """Return the log odds of detections continuing a track instead of being clutter.
 
@@ -180,10 +182,15 @@ class Motion:
             Detections of a track, in time order.
         others : ndarray of int, shape (m,)
             Other detections, in frames in which the track has none.
-        log_clutter : float
-            Logarithm of the number of clutter detections per frame and m³.
+        clutter : float
+            Number of detections of clutter per frame, > 0.
+
+        Returns
+        -------
+        ndarray of shape (m,)
         """
         y, frame = self._d.points, self._frame
+        log_clutter = np.log(clutter) - self._log_volume
         padded = np.concatenate([[-1, -1], own, [-1, -1]])
         at = np.searchsorted(frame[own], frame[others]) + 2
         best = np.full(len(others), -np.inf)

@@ -31,8 +31,6 @@ MAX_SHARED = 0.02
 """Largest share of the frames of a track that a track of the same marker may have too."""
 PROBABLE = float(np.log(4))
 """Log odds from which a detection without a track is brought to one that an edit is about."""
-MIN_EXTENT = 0.01
-"""Smallest extent of the volume in which clutter is spread, metres."""
 IDLE = 50
 """Frames along a track after which no more detections without a track are looked for."""
 MIN_FIT = -40.0
@@ -49,12 +47,8 @@ class Solver:
 
     Parameters
     ----------
-    tracks : Tracks
-        Tracks before any edit.
-    model : TrackingModel
-        Model of motion and noise with which they were tracked.
-    stitching : Stitching, optional
-        Stitching that made the tracks.
+    tracks, model, stitching
+        As for `Correction`.
 
     Attributes
     ----------
@@ -75,9 +69,6 @@ class Solver:
         self.labels = tracks.labels.copy()
         self.names = list(tracks.names)
         self._constraints = Constraints(self._d)
-        extent = np.maximum(np.ptp(self._d.points[tracks.labels >= 0], axis=0), MIN_EXTENT)
-        n_clutter = max(int((tracks.labels < 0).sum()), 1)
-        self._log_clutter = float(np.log(n_clutter / self._d.n_frames / np.prod(extent)))
 
     def solve(self, edit: Edit, constraints: Constraints) -> None:
         """Change labels and names so that they respect one more edit.
@@ -234,7 +225,8 @@ class Solver:
                 part = int(self.evidence.part_of[detection])
                 lanes = self._track_lanes(source, [target], self.labels, part)[0], lanes[1]
         group = self._constraints.group(detection)
-        own = np.array(sorted({*self._constraints.pinned, *group, beside} - {None}))
+        both = group if beside is None else {*group, beside}
+        own = np.array(sorted(self._constraints.pinned | both))
         track = self.labels[own]
         stated = np.where((track == source) & np.isin(own, list(group)) & (own != beside), 1, -1)
         for lane, k in zip(lanes, (source, target), strict=True):
@@ -255,7 +247,7 @@ class Solver:
         if lane.gains[parts[lane.detections] == part].sum() >= 0:
             return False
         own = np.array([detection])
-        return bool(self.evidence.gains(own, part[None], self.labels, [target])[0, 0] > 0)
+        return bool(self.evidence.gains(own, parts[own], self.labels, [target])[0, 0] > 0)
 
     def _lanes(
         self, source: int, targets: Sequence[int], labels: NDArray[np.int64]
@@ -263,7 +255,7 @@ class Solver:
         """Return the lanes of a track and of each of several others, nothing stated."""
         out = self._track_lanes(source, targets, labels)
         return {
-            target: (lane, *self._track_lanes(target, [source], labels))
+            target: (lane, self._track_lanes(target, [source], labels)[0])
             for target, lane in zip(targets, out, strict=True)
         }
 
@@ -326,17 +318,24 @@ class Solver:
     def _collect(self, track: int) -> None:
         """Bring the detections without a track that probably are of the marker of a track to it."""
         labels, frame = self.labels, self._d.frame_of
-        free = labels < 0
-        free[list(self._constraints.clutter)] = False
-        is_known = np.zeros(self._d.n_frames, dtype=bool)
         own = np.flatnonzero(labels == track)
+        is_known = np.zeros(self._d.n_frames, dtype=bool)
         is_known[frame[own]] = True
+        free = self._free()
         others = np.flatnonzero(free & ~is_known[frame])
-        odds = self.evidence.log_odds(others, labels, track)
-        odds += self._motion.log_odds(own, others, self._log_clutter) - self.evidence.ghost[others]
+        if not len(others):
+            return
+        odds = self.evidence.log_odds(others, labels, track) - self.evidence.ghost[others]
+        odds += self._motion.log_odds(own, others, free.sum() / self._d.n_frames)
         others = others[np.argsort(-odds, kind="stable")][: int((odds > PROBABLE).sum())]
-        _, first = np.unique(frame[others], return_index=True)
+        _, first = np.unique(frame[others], return_index=True)  # the most probable of each frame
         labels[others[first]] = track
+
+    def _free(self) -> NDArray[np.bool_]:
+        """Return which detections have no track, without those that an edit is about."""
+        free = self.labels < 0
+        free[[*self._constraints.clutter, *self._constraints.pinned]] = False
+        return free
 
     def _chain(self, detection: int, target: int) -> list[int]:
         """Return the detections without a track that continue one of them to a track.
@@ -344,8 +343,7 @@ class Solver:
         They fit by motion or, where the track has none, by its distances to other tracks.
         """
         d, labels, frame = self._d, self.labels, self._d.frame_of
-        free = labels < 0
-        free[list(self._constraints.clutter)] = False
+        free = self._free()
         is_known = np.zeros(d.n_frames, dtype=bool)
         is_known[frame[labels == target]] = True
         t = int(frame[detection])
