@@ -237,11 +237,12 @@ def latency() -> list[list[str]]:
     labels, frame = start.labels, start.detections.frame_of
     on_track, free = np.flatnonzero(labels >= 0), np.flatnonzero(labels < 0)
     rows: list[list[str]] = []
-    for name, kind, among in (
+    kinds: tuple[tuple[str, EditKind, NDArray[np.int64]], ...] = (
         ("*same*, two detections", "same", on_track),
         ("*same*, a detection without a track", "same", free),
         ("*different*", "different", on_track),
-    ):
+    )
+    for name, kind, among in kinds:
         rng = np.random.default_rng(0)
         correction = am.tracking.Correction(start, model, stitching)
         seconds: list[float] = []

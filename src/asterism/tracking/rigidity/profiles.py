@@ -18,6 +18,8 @@ __all__ = ["Profiles", "candidate_margins", "learn_profiles"]
 
 SAMPLES = 160
 """Number of frames from which profiles are learnt."""
+UNLIKE = -2.0
+"""Log density relative to an unknown marker below which other tracks are not compared."""
 
 
 @record(eq=False)
@@ -91,7 +93,8 @@ def candidate_margins(
     -------
     ndarray of shape (n, 2)
         Log densities relative to an unknown marker, and to the best other track without a detection
-        in the frame, infinite without one. Both are 0 for a track that keeps no distances.
+        in the frame. The second is infinite without such a track, and minus infinite where the
+        first is below `UNLIKE`. Both are 0 for a track that keeps no distances.
     """
     d = detections
     samples = _samples(d)
@@ -105,16 +108,22 @@ def candidate_margins(
         np.ascontiguousarray(d.points[rows]), own, offsets, np.arange(len(samples)),
         n_tracks=n_tracks, noise=noise_sigma,
     )  # fmt: skip
-    is_there = np.zeros((n, n_tracks + 1), dtype=bool)
-    copies = slice(offsets[len(samples)], None)
-    is_there[np.repeat(np.arange(n), d.counts[frame]), own[copies]] = True
+    at, none = len(samples) + np.arange(n), np.empty(0, dtype=np.int64)
+    unknown = engine.densities(np.full(n, track), at, np.arange(n + 1), none)[:, 0]
+    found = np.stack([-unknown, np.where(unknown == 0, 0.0, -np.inf)], axis=1)
+    alike = np.flatnonzero((found[:, 0] > UNLIKE) & (unknown != 0))
+    is_there = np.zeros((len(alike), n_tracks + 1), dtype=bool)
+    counts = d.counts[frame[alike]]
+    rank = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    there = own[np.repeat(first[alike], counts) + rank]
+    is_there[np.repeat(np.arange(len(alike)), counts), there] = True
     others = np.flatnonzero(~is_there[:, :-1].all(axis=0))
-    found = engine.densities(
-        np.full(n, track), len(samples) + np.arange(n), np.arange(n + 1), others
-    )
-    of_others = np.where(is_there[:, others] | (found[:, :-1] == 0), -np.inf, found[:, :-1])
-    best = of_others.max(axis=1, initial=-np.inf)
-    return -np.stack([found[:, -1], np.where(found[:, -1] == 0, 0.0, best)], axis=1)
+    densities = engine.densities(
+        np.full(len(alike), track), at[alike], np.arange(len(alike) + 1), others
+    )[:, :-1]
+    densities[is_there[:, others] | (densities == 0)] = -np.inf
+    found[alike, 1] = -densities.max(axis=1, initial=-np.inf)
+    return found
 
 
 def _samples(d: Detections) -> NDArray[np.int64]:
