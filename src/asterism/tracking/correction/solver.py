@@ -158,13 +158,19 @@ class Solver:
             self._new_track()
 
     def _drop(self, detection: int) -> None:
-        """Make the part of a detection clutter."""
+        """Make the part of a detection clutter.
+
+        Detections that no tracklet had are a part as far as they follow each other in the track.
+        """
         track = int(self.labels[detection])
         if track < 0:
             return
-        own = np.flatnonzero(
-            (self.evidence.part_of == self.evidence.part_of[detection]) & (self.labels == track)
-        )
+        own = np.flatnonzero(self.labels == track)
+        is_in = self.evidence.part_of[own] == self.evidence.part_of[detection]
+        if self.evidence.part_of[detection] < 0:
+            runs = np.cumsum(~is_in)
+            is_in &= runs == runs[np.searchsorted(own, detection)]
+        own = own[is_in]
         pinned = np.isin(own, list(self._constraints.pinned))
         frame = self._d.frame_of
         low = frame[own[pinned & (own < detection)]].max(initial=-1)
@@ -332,10 +338,15 @@ class Solver:
         labels[others[first]] = track
 
     def _free(self) -> NDArray[np.bool_]:
-        """Return which detections have no track, without those that an edit is about."""
-        free = self.labels < 0
-        free[[*self._constraints.clutter, *self._constraints.pinned]] = False
-        return free
+        """Return which detections have no track, without those that an edit is about.
+
+        If an edit states that one is clutter, its tracklet is too.
+        """
+        stated = [*self._constraints.clutter, *self._constraints.pinned]
+        free, parts = self.labels < 0, self.evidence.part_of
+        free[stated] = False
+        ghosts = {int(parts[i]) for i in self._constraints.clutter} - {-1}
+        return free & ~np.isin(parts, list(ghosts)) if ghosts else free
 
     def _chain(self, detection: int, target: int) -> list[int]:
         """Return the detections without a track that continue one of them to a track.
