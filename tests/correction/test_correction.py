@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 import asterism as am
+from asterism.edit import Session
 from asterism.model import Edit
 from asterism.simulate import Burst, Ghosts
+from asterism.tracking.attempts import Uncorrected
 from asterism.tracking.correction.constraints import Constraints, detections_of
 from asterism.tracking.correction.solver import Solver
 from tests.scenes import sized
@@ -311,3 +313,27 @@ def test_a_part_on_two_markers_is_not_exchanged_as_a_whole():
     assert (solver.labels[own] == a).mean() > 0.98
     others = truth.labels != a
     assert (solver.labels[others] == labels[others]).all()
+
+
+def test_what_was_taken_along_from_clutter_can_be_refused(tmp_path):
+    made = am.simulate.person(activity="walk", frames=300, n_markers=40, seed=3)
+    truth = am.simulate.corrupt(made, clutter=0.2, noise=3e-4, seed=3)
+    d, labels = truth.detections, truth.labels.copy()
+    own = np.flatnonzero(labels == nearest_pair(truth, 100)[0])
+    labels[own[[50, 80, 120, 121, 122, 200]]] = -1
+    begun = Uncorrected(
+        tracks=am.Tracks(detections=d, labels=labels),
+        recipe=am.tracking.plan_tracking(d).recipe,
+        model=am.estimate_model(made.detections).model,
+    )
+    session = Session(begun, tmp_path / "e.toml")
+    change = session.apply(session.edit("same", int(own[0]), int(own[50])))
+    assert change.stretches[0].is_asked
+    assert change.stretches[0].n_detections == 1
+    firsts = [each.first for each in change.stretches]
+    i = firsts.index(d.frame_of[own[120]])
+    assert change.stretches[i].n_detections == 3
+    assert not change.stretches[i].is_asked
+    session.refuse(change, i)
+    assert (session.tracks.labels[own[120:123]] == -1).all()
+    assert (session.tracks.labels[own[[50, 80, 200]]] >= 0).all()
