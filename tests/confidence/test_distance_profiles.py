@@ -7,7 +7,7 @@ import pytest
 
 import asterism as am
 from asterism import _engine
-from asterism.tracking.rigidity.profiles import candidate_densities, learn_profiles
+from asterism.tracking.rigidity.profiles import candidate_margins, learn_profiles
 from tests.references.distance_profiles import PART_FRAMES, SAMPLES, compare_part
 from tests.scenes import moving, sized
 
@@ -205,24 +205,27 @@ def test_damaged_pairs_are_refused(pairs):
 @pytest.mark.parametrize("frames", [100, 300])
 def test_candidates_fit_a_track_as_each_would_alone(frames):
     made = am.simulate.person(activity="walk", frames=frames, n_markers=40, seed=3)
-    truth = am.simulate.corrupt(made, clutter=0.1, noise=3e-4, seed=3)
+    truth = am.simulate.corrupt(made, missing=0.05, clutter=0.1, noise=3e-4, seed=3)
     d, labels, track = truth.detections, truth.labels.copy(), 4
     is_lost = np.isin(d.frame_of, np.arange(40, 60))
     labels[is_lost & (labels == track)] = -1
     candidates = np.flatnonzero(is_lost & (labels < 0))
-    found = candidate_densities(d, labels, 3e-4, candidates, track)
-    for i, density in zip(candidates, found, strict=True):
+    found = candidate_margins(d, labels, 3e-4, candidates, track)
+    for i, margins in zip(candidates, found, strict=True):
         alone, frame = labels.copy(), d.frame_of[[i]].astype(np.int64)
         alone[i] = track
         profiles = learn_profiles(d, alone, 3e-4, frame)
         # The profile of the track is learnt without the candidate.
         sampled = np.isin(frame, np.arange(160) * frames // 160)
         at = np.searchsorted(profiles.frames, frame)
-        (unknown,) = profiles.engine.densities(
-            np.array([track]), at, np.arange(2), np.empty(0, dtype=np.int64)
-        )[0]
-        assert density == pytest.approx(-unknown, abs=0.1 if sampled else 1e-9)
+        there = alone[d.offsets[frame[0]] : d.offsets[frame[0] + 1]]
+        absent = np.setdiff1d(np.arange(truth.n_tracks), there)
+        *others, unknown = profiles.engine.densities(np.array([track]), at, np.arange(2), absent)[0]
+        best = max((one for one in others if one != 0), default=-np.inf)
+        wanted = [-unknown, -best if unknown < 2 else -np.inf]
+        assert margins == pytest.approx(wanted, abs=0.1 if sampled else 1e-9)
     is_right = truth.labels[candidates] == track
-    assert found[is_right].min() > 0 > found[~is_right].max()
-    assert len(candidate_densities(d, labels, 3e-4, candidates[:0], track)) == 0
-    assert not candidate_densities(d, labels, 3e-4, candidates, truth.n_tracks).any()
+    assert found[is_right, 0].min() > 0 > found[~is_right, 0].max()
+    assert np.isfinite(found[:, 1]).any()
+    assert len(candidate_margins(d, labels, 3e-4, candidates[:0], track)) == 0
+    assert not candidate_margins(d, labels, 3e-4, candidates, truth.n_tracks).any()

@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 
 import asterism as am
+from asterism.edit import Session
 from asterism.model import Edit
 from asterism.simulate import Burst, Ghosts
-from asterism.tracking.correction.constraints import detections_of
+from asterism.tracking.attempts import Uncorrected
+from asterism.tracking.correction.constraints import Constraints, detections_of
+from asterism.tracking.correction.solver import Solver
 from tests.scenes import sized
 
 
@@ -271,3 +274,66 @@ def test_one_statement_takes_all_detections_that_keep_the_distances_of_the_track
     edit = Edit(kind="same", at=at(d, own[20], lost[6]))
     found = am.tracking.correct(am.Tracks(detections=d, labels=labels), [edit], model)
     assert (found.labels == truth.labels).all()
+
+
+def test_one_statement_takes_the_probable_detections_of_its_marker_in_the_whole_capture():
+    made = am.simulate.person(activity="walk", frames=300, n_markers=40, seed=3)
+    truth = am.simulate.corrupt(made, clutter=0.2, noise=3e-4, seed=3)
+    d, labels, rng = truth.detections, truth.labels.copy(), np.random.default_rng(2)
+    marker, other = nearest_pair(truth, 100)
+    own, of_other = (np.flatnonzero(labels == k) for k in (marker, other))
+    lost = rng.choice(own[30:-30], 40, replace=False)
+    left = rng.choice(of_other[30:-30], 5, replace=False)
+    labels[lost] = labels[left] = -1
+    tracks = am.Tracks(detections=d, labels=labels)
+    model = am.estimate_model(made.detections).model
+    apart = Edit(kind="different", at=at(d, own[0], lost[1]))
+    edit = Edit(kind="same", at=at(d, own[0], lost[0]))
+    found = am.tracking.correct(tracks, [apart, edit], model)
+    changed = np.flatnonzero(found.labels != labels)
+    assert set(found.labels[changed]) == {marker}
+    assert (truth.labels[changed] == marker).all()
+    assert len(changed) > 0.9 * len(lost)
+    assert found.labels[lost[1]] == -1  # it is stated to be of another marker
+
+
+def test_a_part_on_two_markers_is_not_exchanged_as_a_whole():
+    truth = am.simulate.person(activity="walk", frames=300, n_markers=40, seed=3)
+    d, labels, frame = truth.detections, truth.labels.copy(), truth.detections.frame_of
+    a, b = 4, 20
+    inside = (frame >= 100) & (frame < 112)
+    labels[inside & (labels == b)] = -1
+    labels[inside & (labels == a)] = b
+    solver = Solver(am.Tracks(detections=d, labels=labels), am.estimate_model(d).model)
+    # No link is uncertain: all detections of a track are one part.
+    solver.evidence.part_of[:] = labels
+    solver.evidence.before = np.ones(truth.n_tracks)
+    own = np.flatnonzero(truth.labels == a)
+    solver.solve(Edit(kind="same", at=at(d, own[20], own[106])), Constraints(d))
+    assert (solver.labels[own] == a).mean() > 0.98
+    others = truth.labels != a
+    assert (solver.labels[others] == labels[others]).all()
+
+
+def test_what_was_taken_along_from_clutter_can_be_refused(tmp_path):
+    made = am.simulate.person(activity="walk", frames=300, n_markers=40, seed=3)
+    truth = am.simulate.corrupt(made, clutter=0.2, noise=3e-4, seed=3)
+    d, labels = truth.detections, truth.labels.copy()
+    own = np.flatnonzero(labels == nearest_pair(truth, 100)[0])
+    labels[own[[50, 80, 120, 121, 122, 200]]] = -1
+    begun = Uncorrected(
+        tracks=am.Tracks(detections=d, labels=labels),
+        recipe=am.tracking.plan_tracking(d).recipe,
+        model=am.estimate_model(made.detections).model,
+    )
+    session = Session(begun, tmp_path / "e.toml")
+    change = session.apply(session.edit("same", int(own[0]), int(own[50])))
+    assert change.stretches[0].is_asked
+    assert change.stretches[0].n_detections == 1
+    firsts = [each.first for each in change.stretches]
+    i = firsts.index(d.frame_of[own[120]])
+    assert change.stretches[i].n_detections == 3
+    assert not change.stretches[i].is_asked
+    session.refuse(change, i)
+    assert (session.tracks.labels[own[120:123]] == -1).all()
+    assert (session.tracks.labels[own[[50, 80, 200]]] >= 0).all()

@@ -105,3 +105,37 @@ def test_a_straight_continuation_fits_better_than_a_bent_one():
     straight, bent = Motion(d, model).continuation(0, 1, np.array([2, 3]))
     assert straight == 0
     assert bent < straight
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_log_odds_by_motion_are_those_of_the_likelier_link(seed):
+    truth = am.simulate.corrupt(
+        am.simulate.cube(frames=120, seed=seed), missing=0.3, clutter=0.3, seed=seed
+    )
+    d, model = truth.detections, am.estimate_model(truth.detections).model
+    motion, y, frame = Motion(d, model), d.points, d.frame_of
+    own = np.flatnonzero(truth.labels == 0)
+    own = own[(frame[own] < 8) | (frame[own] > 112)]
+    others = np.flatnonzero(~np.isin(frame, frame[own]))
+    volume = np.prod(np.maximum(y.max(axis=0) - y.min(axis=0), 0.01))
+
+    def link(near, i):
+        """Return the log odds of the link to the first of these detections, None if it is long."""
+        if not len(near) or abs(frame[i] - frame[near[0]]) > motion.max_gap:
+            return None
+        n, velocity, factor = frame[i] - frame[near[0]], 0, 9
+        if len(near) > 1 and abs(frame[near[0]] - frame[near[1]]) <= motion.max_gap:
+            velocity = (y[near[0]] - y[near[1]]) / (frame[near[0]] - frame[near[1]])
+            factor = 1
+        variance = factor * (motion._r + motion._q * abs(n) ** 3)
+        off2 = ((y[i] - y[near[0]] - n * velocity) ** 2).sum()
+        density = -2 * np.log1p(off2 / (3 * variance)) - 1.5 * np.log(2 * np.pi * variance)
+        return density - np.log(2.5 / volume)
+
+    found = motion.log_odds(own, others, 2.5)
+    for i, odds in zip(others, found, strict=True):
+        sides = own[frame[own] < frame[i]][::-1][:2], own[frame[own] > frame[i]][:2]
+        links = [each for each in (link(side, i) for side in sides) if each is not None]
+        assert odds == pytest.approx(np.clip(max(links), -2, 2) if links else 0)
+    assert found.min() < 0 < found.max()
+    assert (found == 0).any()

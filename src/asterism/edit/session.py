@@ -196,7 +196,8 @@ class Session:
         """Take back one of the stretches that followed from an edit, by a further edit.
 
         Where its former track now has the detections of the edit at that time, the stretch cannot
-        return to it; it is then stated to be of another marker than its new track.
+        return to it; it is then stated to be of another marker than its new track. Detections that
+        had no track become clutter.
 
         Parameters
         ----------
@@ -230,6 +231,8 @@ class Session:
             and each.last >= stretch.first
             for each in change.stretches
         )  # fmt: skip
+        if stretch.source < 0:
+            return self.apply(self.edit("clutter", middle))
         anchor = None if is_taken else self._anchor(stretch.source, middle)
         if anchor is None:
             return self.apply(self.edit("different", middle, self._other(stretch.target, own)))

@@ -105,7 +105,7 @@ def change_of(
                 target=target, n_detections=len(run),
                 is_asked=bool(np.isin(changed[run], own).any()),
             )
-            for run in np.split(which, _breaks(changed[which], source, labels[0]))
+            for run in np.split(which, _breaks(changed[which], source, target, labels))
         ]  # fmt: skip
     stretches.sort(key=lambda each: (not each.is_asked, each.first, each.source))
     old = [*names[0], *[None] * (len(names[1]) - len(names[0]))]
@@ -119,9 +119,15 @@ def change_of(
     )  # fmt: skip
 
 
-def _breaks(moved: NDArray[np.int64], source: int, labels: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return where detections of a track that moved do not follow each other in it."""
-    if source < 0:
-        return np.empty(0, dtype=np.int64)
-    place = np.searchsorted(np.flatnonzero(labels == source), moved)
-    return np.flatnonzero(np.diff(place) > 1) + 1
+def _breaks(
+    moved: NDArray[np.int64],
+    source: int,
+    target: int,
+    labels: tuple[NDArray[np.int64], NDArray[np.int64]],
+) -> NDArray[np.int64]:
+    """Return where detections that moved do not follow each other in their track.
+
+    It is the track that they had before, or the new one of those that had none.
+    """
+    own = labels[0] == source if source >= 0 else labels[1] == target
+    return np.flatnonzero(np.diff(np.searchsorted(np.flatnonzero(own), moved)) > 1) + 1

@@ -28,7 +28,8 @@ class Correction:
     Tracks of one marker that share hardly a frame are joined as a whole. Two other tracks are
     exchanged in intervals of time, of which one holds the part. They are chosen so that the log
     posterior is largest: the distances to other markers of what is exchanged, and the links that
-    are cut, as in the identity confidence (`assess`). Detections of earlier edits stay.
+    are cut, as in the identity confidence (`assess`). Detections of earlier edits stay. A track
+    whose marker is stated also takes the detections without a track that are probably of it.
 
     Parameters
     ----------

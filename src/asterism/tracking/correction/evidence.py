@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.tracking.confidence.calibration import MARGINS, PART
+from asterism.tracking.confidence.calibration import MARGINS, PART, log_odds
 from asterism.tracking.confidence.identity import examine
 from asterism.tracking.confidence.parts import PART_FRAMES
-from asterism.tracking.rigidity.profiles import candidate_densities, learn_profiles
+from asterism.tracking.rigidity.profiles import candidate_margins, learn_profiles
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from asterism.model import TrackingModel, Tracks
@@ -25,12 +27,8 @@ class Evidence:
 
     Parameters
     ----------
-    tracks : Tracks
-        Tracks before any edit.
-    model : TrackingModel
-        Model of motion and noise with which they were tracked.
-    stitching : Stitching, optional
-        Stitching that made the tracks.
+    tracks, model, stitching
+        As for `Correction`.
 
     Attributes
     ----------
@@ -38,6 +36,8 @@ class Evidence:
         Part of each detection, -1 for clutter without a tracklet.
     before : ndarray of shape (P,)
         Probability of the link that leads to each part.
+    ghost : ndarray of shape (N,)
+        Log odds of the tracklet of each detection being a ghost, 0 for other detections.
     """
 
     def __init__(
@@ -48,16 +48,23 @@ class Evidence:
         self.before = parts.before
         n = len(parts.track)
         self.part_of = np.full(len(tracks.labels), -1)
+        self.ghost = np.zeros(len(tracks.labels))
         self.part_of[tracks.by_track[0]] = np.repeat(np.arange(n), parts.n_detections)
         if stitching is not None:  # ghosts are parts too, which a person can take back
             is_ghost = (tracks.labels < 0) & (stitching.tracklets >= 0)
             _, numbers = np.unique(stitching.tracklets[is_ghost], return_inverse=True)
             self.part_of[is_ghost] = n + numbers
+            of = stitching.tracklets[is_ghost]
+            self.ghost[is_ghost] = log_odds(stitching.probabilities[of])
 
     def gains(
-        self, detections: NDArray[np.int64], labels: NDArray[np.int64], then: int
+        self,
+        detections: NDArray[np.int64],
+        parts: NDArray[np.int64],
+        labels: NDArray[np.int64],
+        others: Sequence[int],
     ) -> NDArray[np.float64]:
-        """Return the log odds that each detection of a track gains in another track.
+        """Return the log odds that each detection of a track gains in other tracks.
 
         Those of a part are shared by its detections.
 
@@ -65,18 +72,26 @@ class Evidence:
         ----------
         detections : ndarray of int, shape (n,)
             Detections of one track, in time order.
+        parts : ndarray of int, shape (n,)
+            Their parts.
         labels : ndarray of int, shape (N,)
             Track of each detection now.
-        then : int
-            Other track; one without detections is an unknown marker.
+        others : sequence of int
+            K other tracks; one without detections is an unknown marker.
+
+        Returns
+        -------
+        ndarray of shape (K, n)
         """
         if not len(detections):
-            return np.empty(0)
-        others = np.array([then] if (labels == then).any() else [], dtype=np.int64)
-        found, counts = self._densities(detections, labels, others)
-        density, factor = found[:, 0], PART[2] if len(others) else PART[1]
-        gain = factor * np.clip(density, -MARGINS[1], -MARGINS[0])
-        return np.repeat(gain / counts, counts)
+            return np.empty((len(others), 0))
+        is_known = np.array([(labels == k).any() for k in others])
+        known = np.array(others, dtype=np.int64)[is_known]
+        found, counts = self._densities(detections, parts, labels, known)
+        column = np.where(is_known, np.cumsum(is_known) - 1, len(known))
+        factor = np.where(is_known, PART[2], PART[1])[:, None]
+        gain = factor * np.clip(found.T[column], -MARGINS[1], -MARGINS[0])
+        return np.repeat(gain / counts, counts, axis=1)
 
     def best(self, detection: int, labels: NDArray[np.int64], n: int) -> list[int]:
         """Return the `n` other tracks that the part of a detection fits best.
@@ -93,8 +108,9 @@ class Evidence:
         own = np.flatnonzero(
             (self.part_of == self.part_of[detection]) & (labels == labels[detection])
         )
-        others = np.unique(labels[(labels >= 0) & (labels != labels[detection])])
-        found = self._densities(own, labels, others)[0][0, :-1]
+        others = np.flatnonzero(np.bincount(labels + 1)[1:])
+        others = others[others != labels[detection]]
+        found = self._densities(own, self.part_of[own], labels, others)[0][0, :-1]
         order = np.argsort(-found, kind="stable")
         return [int(others[i]) for i in order if found[i] != 0][:n]
 
@@ -103,7 +119,8 @@ class Evidence:
     ) -> NDArray[np.float64]:
         """Return the log odds that single detections are of the marker of a track.
 
-        They are those of a part of one detection that no other track has as an alternative.
+        They are those of a part of one detection, whose alternatives are the tracks without a
+        detection in its frame.
 
         Parameters
         ----------
@@ -119,15 +136,19 @@ class Evidence:
         ndarray of shape (n,)
             Log odds, 0 for a track that keeps no distances.
         """
-        density = candidate_densities(self._detections, labels, self._noise, detections, track)
-        found = PART[0] + PART[1] * np.clip(density, *MARGINS) + PART[2] * MARGINS[1]
-        return np.where(density == 0, 0.0, found)
+        margins = candidate_margins(self._detections, labels, self._noise, detections, track)
+        found = PART[0] + np.clip(margins, *MARGINS) @ PART[1:3]
+        return np.where(margins[:, 0] == 0, 0.0, found)
 
     def _densities(
-        self, detections: NDArray[np.int64], labels: NDArray[np.int64], others: NDArray[np.int64]
+        self,
+        detections: NDArray[np.int64],
+        parts: NDArray[np.int64],
+        labels: NDArray[np.int64],
+        others: NDArray[np.int64],
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Return the log densities of the parts of a track, and the lengths of the parts."""
-        d, parts = self._detections, self.part_of[detections]
+        d = self._detections
         starts = np.flatnonzero(np.concatenate([[True], parts[1:] != parts[:-1]]))
         lengths = np.diff(np.append(starts, len(parts)))
         counts = np.minimum(lengths, PART_FRAMES)

@@ -24,6 +24,10 @@ __all__ = ["Exchange", "Lane", "Motion", "best_exchange"]
 
 FARTHEST = 12.0
 """Largest deviation of a link from straight motion that is counted, in log-likelihood units."""
+MAX_ODDS = 2.0
+"""Largest log odds by straight motion alone, which markers that accelerate do not keep to."""
+MIN_EXTENT = 0.01
+"""Smallest extent of the volume in which clutter is spread, metres."""
 WINDOW = 64
 """Number of frames around a cut in which the filter looks for detections."""
 BEGIN = -6.0
@@ -97,12 +101,15 @@ class Motion:
 
     def __init__(self, detections: Detections, model: TrackingModel) -> None:
         self._d, self._frame = detections, detections.frame_of
+        y = detections.points
         self._steps = kind, _, Q = steps_of(model.motion, detections.times)
         usual = np.bincount(kind[1:]).argmax() if len(kind) > 1 else 0
         self._q = float(Q[usual, Q.shape[1] // 2, 0, 0])
         self._r = 6 * model.sensor.noise_sigma**2
         self.max_gap = model.population.max_gap + 1
         self._model = model
+        corners = [f(axis=0, initial=s) for f, s in ((y.max, -np.inf), (y.min, np.inf))]
+        self._log_volume = float(np.log(np.maximum(corners[0] - corners[1], MIN_EXTENT)).sum())
 
     def ratios(self, lanes: tuple[Lane, Lane], cuts: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the log-likelihood ratios of exchanges of both tails, by the filter of the model.
@@ -160,6 +167,45 @@ class Motion:
             velocity, factor = (y[head] - y[before]) / (frame[head] - frame[before]), 1.0
         off = y[others] - y[head] - n * velocity
         return -(off**2).sum(axis=1) / (2 * factor * (self._r + self._q * abs(n) ** 3))
+
+    def log_odds(
+        self, own: NDArray[np.int64], others: NDArray[np.int64], clutter: float
+    ) -> NDArray[np.float64]:
+        """Return the log odds of detections continuing a track instead of being clutter.
+
+        They are those of the likelier one of the links from before and from after, bounded by
+        `MAX_ODDS`, and 0 without a short link.
+
+        Parameters
+        ----------
+        own : ndarray of int, shape (n,)
+            Detections of a track, in time order.
+        others : ndarray of int, shape (m,)
+            Other detections, in frames in which the track has none.
+        clutter : float
+            Number of detections of clutter per frame, > 0.
+
+        Returns
+        -------
+        ndarray of shape (m,)
+        """
+        y, frame = self._d.points, self._frame
+        log_clutter = np.log(clutter) - self._log_volume
+        padded = np.concatenate([[-1, -1], own, [-1, -1]])
+        at = np.searchsorted(frame[own], frame[others]) + 2
+        best = np.full(len(others), -np.inf)
+        for before, head in ((padded[at - 2], padded[at - 1]), (padded[at + 1], padded[at])):
+            n = np.abs(frame[others] - frame[head])
+            step = frame[head] - frame[before]
+            straight = (before >= 0) & (np.abs(step) <= self.max_gap) & (step != 0)
+            velocity = (y[head] - y[before]) / np.where(straight, step, np.inf)[:, None]
+            off = y[others] - y[head] - (frame[others] - frame[head])[:, None] * velocity
+            variance = np.where(straight, 1, 9) * (self._r + self._q * n**3.0)
+            density = -2 * np.log1p((off**2).sum(axis=1) / (3 * variance))
+            density -= self._d.n_axes / 2 * np.log(2 * np.pi * variance)
+            is_short = (head >= 0) & (n <= self.max_gap)
+            best = np.where(is_short, np.maximum(best, density - log_clutter), best)
+        return np.where(np.isinf(best), 0, best.clip(-MAX_ODDS, MAX_ODDS))
 
     def log_likelihood(
         self, before: NDArray[np.int64], head: NDArray[np.int64], tail: NDArray[np.int64]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +29,8 @@ TRACKED = 3.0
 """Log odds of a detection that continues a track being of its marker instead of clutter."""
 MAX_SHARED = 0.02
 """Largest share of the frames of a track that a track of the same marker may have too."""
+PROBABLE = float(np.log(4))
+"""Log odds from which a detection without a track is brought to one that an edit is about."""
 IDLE = 50
 """Frames along a track after which no more detections without a track are looked for."""
 MIN_FIT = -40.0
@@ -44,12 +47,8 @@ class Solver:
 
     Parameters
     ----------
-    tracks : Tracks
-        Tracks before any edit.
-    model : TrackingModel
-        Model of motion and noise with which they were tracked.
-    stitching : Stitching, optional
-        Stitching that made the tracks.
+    tracks, model, stitching
+        As for `Correction`.
 
     Attributes
     ----------
@@ -96,6 +95,8 @@ class Solver:
             self._drop(own[0])
         elif edit.kind == "name":
             self._call(own[0], edit.name)
+        if edit.kind in ("same", "name"):
+            self._collect(int(self.labels[own[0]]))
 
     def _join(self, own: Sequence[int]) -> None:
         """Bring two detections to one track."""
@@ -145,24 +146,31 @@ class Solver:
         found: list[_Solution | None] = []
         later = max(own, key=lambda i: self._d.frame_of[i])
         cut = int(self._d.frame_of[later]) if is_here else None
-        for detection, beside in ((own[0], own[1]), (own[1], own[0])):
-            others = self.evidence.best(detection, self.labels, CANDIDATES)
+        targets = [[*self.evidence.best(i, self.labels, CANDIDATES), len(self.names)] for i in own]
+        lanes = self._lanes(a, list(dict.fromkeys(itertools.chain(*targets))), self.labels)
+        for detection, beside, others in zip(own, reversed(own), targets, strict=True):
             found += [
-                self._solve(detection, a, other, cut, beside=beside)
-                for other in (*others, len(self.names))
+                self._solve(detection, a, other, cut, beside=beside, lanes=lanes[other])
+                for other in others
             ]
         self._carry_out(*found)
         if (self.labels == len(self.names)).any():
             self._new_track()
 
     def _drop(self, detection: int) -> None:
-        """Make the part of a detection clutter."""
+        """Make the part of a detection clutter.
+
+        Detections that no tracklet had are a part as far as they follow each other in the track.
+        """
         track = int(self.labels[detection])
         if track < 0:
             return
-        own = np.flatnonzero(
-            (self.evidence.part_of == self.evidence.part_of[detection]) & (self.labels == track)
-        )
+        own = np.flatnonzero(self.labels == track)
+        is_in = self.evidence.part_of[own] == self.evidence.part_of[detection]
+        if self.evidence.part_of[detection] < 0:
+            runs = np.cumsum(~is_in)
+            is_in &= runs == runs[np.searchsorted(own, detection)]
+        own = own[is_in]
         pinned = np.isin(own, list(self._constraints.pinned))
         frame = self._d.frame_of
         low = frame[own[pinned & (own < detection)]].max(initial=-1)
@@ -208,80 +216,137 @@ class Solver:
         target: int,
         cut: int | None = None,
         beside: int | None = None,
-        labels: NDArray[np.int64] | None = None,
+        lanes: tuple[Lane, Lane] | None = None,
     ) -> _Solution | None:
-        """Return the gain and the labels with a detection and its group on another track.
+        """Return the gain and the moves that bring a detection and its group to another track.
 
         Detections of other groups stay. The detection `beside` of the same edit stays where it is.
+        The lanes are those of both tracks, by default as the labels are now.
         """
         if not self._may_be(detection, target):
             return None
-        labels = self.labels.copy() if labels is None else labels
+        if lanes is None:
+            lanes = self._lanes(source, [target], self.labels)[target]
+            if source != CLUTTER and self._is_in_mixed_part(detection, lanes[0], target):
+                part = int(self.evidence.part_of[detection])
+                lanes = self._track_lanes(source, [target], self.labels, part)[0], lanes[1]
         group = self._constraints.group(detection)
-        own = np.array(sorted(self._constraints.pinned | group))
-        is_group = np.isin(own, list(group))
-        stated = np.zeros(len(labels), dtype=np.int8)
-        stated[own] = np.where(is_group & (labels[own] == source), 1, -1)
-        if beside is not None:
-            stated[beside] = -1
-        lanes = (
-            self._lane(source, target, labels, stated),
-            self._lane(target, source, labels, stated),
-        )
+        both = group if beside is None else {*group, beside}
+        own = np.array(sorted(self._constraints.pinned | both))
+        track = self.labels[own]
+        stated = np.where((track == source) & np.isin(own, list(group)) & (own != beside), 1, -1)
+        for lane, k in zip(lanes, (source, target), strict=True):
+            lane.stated[:] = 0
+            lane.stated[np.searchsorted(lane.detections, own[track == k])] = stated[track == k]
         found = best_exchange(lanes, self._motion, cut)
         if found is None:
             return None
-        for lane, then in zip(lanes, (target, source), strict=True):
-            labels[lane.detections[found.inside(lane.frames)]] = then
-        return found.gain, labels
+        return found.gain, [
+            (lane.detections[found.inside(lane.frames)], then)
+            for lane, then in zip(lanes, (target, source), strict=True)
+        ]
 
-    def _lane(
-        self, track: int, other: int, labels: NDArray[np.int64], stated: NDArray[np.int8]
-    ) -> Lane:
+    def _is_in_mixed_part(self, detection: int, lane: Lane, target: int) -> bool:
+        """Return whether a detection fits another track that its part does not fit."""
+        parts = self.evidence.part_of
+        part = parts[detection]
+        if lane.gains[parts[lane.detections] == part].sum() >= 0:
+            return False
+        own = np.array([detection])
+        return bool(self.evidence.gains(own, parts[own], self.labels, [target])[0, 0] > 0)
+
+    def _lanes(
+        self, source: int, targets: Sequence[int], labels: NDArray[np.int64]
+    ) -> dict[int, tuple[Lane, Lane]]:
+        """Return the lanes of a track and of each of several others, nothing stated."""
+        out = self._track_lanes(source, targets, labels)
+        return {
+            target: (lane, self._track_lanes(target, [source], labels)[0])
+            for target, lane in zip(targets, out, strict=True)
+        }
+
+    def _track_lanes(
+        self,
+        track: int,
+        others: Sequence[int],
+        labels: NDArray[np.int64],
+        mixed: int | None = None,
+    ) -> list[Lane]:
+        """Return the lane of a track for an exchange with each of several others.
+
+        Each detection of a mixed part is a part of its own.
+        """
         evidence, own = self.evidence, np.flatnonzero(labels == track)
         parts = evidence.part_of[own]
+        if mixed is not None:
+            inside = np.flatnonzero(parts == mixed)
+            parts[inside[1:]] = -1 - np.arange(1, len(inside))
         starts = np.ones(len(own), dtype=bool)
         starts[1:] = parts[1:] != parts[:-1]
         before = np.ones(len(own))
         known = starts & (parts >= 0) & (parts < len(evidence.before))
         before[known] = evidence.before[parts[known]]
-        return Lane(
-            detections=own,
-            frames=self._d.frame_of[own],
-            gains=(
-                np.full(len(own), TRACKED if track == CLUTTER else -TRACKED)
-                if CLUTTER in (track, other)
-                else evidence.gains(own, labels, other)
-            ),
-            starts=starts,
-            before=before,
-            stated=stated[own],
+        gains = (
+            np.full((len(others), len(own)), TRACKED if track == CLUTTER else -TRACKED)
+            if CLUTTER in (track, *others)
+            else evidence.gains(own, parts, labels, others)
         )
+        return [
+            Lane(
+                detections=own, frames=self._d.frame_of[own], gains=gain, starts=starts,
+                before=before, stated=np.zeros(len(own), dtype=np.int8),
+            )
+            for gain in gains
+        ]  # fmt: skip
 
     def _carry_out(self, *solutions: _Solution | None) -> None:
-        """Take the labels with the largest gain."""
+        """Make the moves with the largest gain."""
         found = [each for each in solutions if each is not None]
         if not found:
             raise NoSolution
-        self.labels = max(found, key=lambda each: each[0])[1]
+        for detections, track in max(found, key=lambda each: each[0])[1]:
+            self.labels[detections] = track
 
     def _take(self, detection: int, target: int, beside: int | None = None) -> None:
         """Bring a detection without a track, and those around that continue it, to a track.
 
         Where the track has a detection in the same frame, both may be exchanged.
         """
-        labels, frame = self.labels.copy(), self._d.frame_of
+        labels, frame = self.labels, self._d.frame_of
         chain = np.array(self._chain(detection, target))
         is_taken = np.isin(frame[chain], frame[labels == target])
         labels[chain[~is_taken]] = target
         if labels[detection] != target:
             labels[chain[is_taken]] = CLUTTER
-            found = self._solve(detection, CLUTTER, target, beside=beside, labels=labels)
-            if found is None:
-                raise NoSolution
-            labels = found[1]
+            self._carry_out(self._solve(detection, CLUTTER, target, beside=beside))
             labels[labels == CLUTTER] = -1  # given for them, or not taken
-        self.labels = labels
+
+    def _collect(self, track: int) -> None:
+        """Bring the detections without a track that probably are of the marker of a track to it."""
+        labels, frame = self.labels, self._d.frame_of
+        own = np.flatnonzero(labels == track)
+        is_known = np.zeros(self._d.n_frames, dtype=bool)
+        is_known[frame[own]] = True
+        free = self._free()
+        others = np.flatnonzero(free & ~is_known[frame])
+        if not len(others):
+            return
+        odds = self.evidence.log_odds(others, labels, track) - self.evidence.ghost[others]
+        odds += self._motion.log_odds(own, others, free.sum() / self._d.n_frames)
+        others = others[np.argsort(-odds, kind="stable")][: int((odds > PROBABLE).sum())]
+        _, first = np.unique(frame[others], return_index=True)  # the most probable of each frame
+        labels[others[first]] = track
+
+    def _free(self) -> NDArray[np.bool_]:
+        """Return which detections have no track, without those that an edit is about.
+
+        If an edit states that one is clutter, its tracklet is too.
+        """
+        stated = [*self._constraints.clutter, *self._constraints.pinned]
+        free, parts = self.labels < 0, self.evidence.part_of
+        free[stated] = False
+        ghosts = {int(parts[i]) for i in self._constraints.clutter} - {-1}
+        return free & ~np.isin(parts, list(ghosts)) if ghosts else free
 
     def _chain(self, detection: int, target: int) -> list[int]:
         """Return the detections without a track that continue one of them to a track.
@@ -289,8 +354,7 @@ class Solver:
         They fit by motion or, where the track has none, by its distances to other tracks.
         """
         d, labels, frame = self._d, self.labels, self._d.frame_of
-        free = labels < 0
-        free[list(self._constraints.clutter)] = False
+        free = self._free()
         is_known = np.zeros(d.n_frames, dtype=bool)
         is_known[frame[labels == target]] = True
         t = int(frame[detection])
@@ -322,4 +386,5 @@ class Solver:
         return chain
 
 
-_Solution = tuple[float, "NDArray[np.int64]"]
+_Solution = tuple[float, list[tuple["NDArray[np.int64]", int]]]
+"""Gain, and the detections that go to each track."""

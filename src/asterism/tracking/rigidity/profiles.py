@@ -14,10 +14,12 @@ if TYPE_CHECKING:
 
     from asterism.model import Detections
 
-__all__ = ["Profiles", "candidate_densities", "learn_profiles"]
+__all__ = ["Profiles", "candidate_margins", "learn_profiles"]
 
 SAMPLES = 160
 """Number of frames from which profiles are learnt."""
+UNLIKE = -2.0
+"""Log density relative to an unknown marker below which other tracks are not compared."""
 
 
 @record(eq=False)
@@ -69,14 +71,14 @@ def learn_profiles(
     return Profiles(frames=frames, engine=engine)
 
 
-def candidate_densities(
+def candidate_margins(
     detections: Detections,
     labels: NDArray[np.int64],
     noise_sigma: float,
     candidates: NDArray[np.int64],
     track: int,
 ) -> NDArray[np.float64]:
-    """Return how well the distances of single detections fit a track, shape (n,).
+    """Return how well the distances of single detections fit a track, shape (n, 2).
 
     Parameters
     ----------
@@ -89,8 +91,10 @@ def candidate_densities(
 
     Returns
     -------
-    ndarray of shape (n,)
-        Log densities relative to an unknown marker, 0 for a track that keeps no distances.
+    ndarray of shape (n, 2)
+        Log densities relative to an unknown marker, and to the best other track without a detection
+        in the frame. The second is infinite without such a track, and minus infinite where the
+        first is below `UNLIKE`. Both are 0 for a track that keeps no distances.
     """
     d = detections
     samples = _samples(d)
@@ -99,13 +103,27 @@ def candidate_densities(
     rows, offsets = _rows(d, np.concatenate([samples, frame]))
     own, first = labels[rows], offsets[len(samples) : -1]
     own[first + candidates - d.offsets[frame]] = track
+    n, n_tracks = len(candidates), int(labels.max(initial=track)) + 1
     engine = _engine.DistanceProfiles(
         np.ascontiguousarray(d.points[rows]), own, offsets, np.arange(len(samples)),
-        n_tracks=int(labels.max(initial=track)) + 1, noise=noise_sigma,
+        n_tracks=n_tracks, noise=noise_sigma,
     )  # fmt: skip
-    n, none = len(candidates), np.empty(0, dtype=np.int64)
-    at = len(samples) + np.arange(n)
-    return -engine.densities(np.full(n, track), at, np.arange(n + 1), none)[:, 0]
+    at, none = len(samples) + np.arange(n), np.empty(0, dtype=np.int64)
+    unknown = engine.densities(np.full(n, track), at, np.arange(n + 1), none)[:, 0]
+    found = np.stack([-unknown, np.where(unknown == 0, 0.0, -np.inf)], axis=1)
+    alike = np.flatnonzero((found[:, 0] > UNLIKE) & (unknown != 0))
+    is_there = np.zeros((len(alike), n_tracks + 1), dtype=bool)
+    counts = d.counts[frame[alike]]
+    rank = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    there = own[np.repeat(first[alike], counts) + rank]
+    is_there[np.repeat(np.arange(len(alike)), counts), there] = True
+    others = np.flatnonzero(~is_there[:, :-1].all(axis=0))
+    densities = engine.densities(
+        np.full(len(alike), track), at[alike], np.arange(len(alike) + 1), others
+    )[:, :-1]
+    densities[is_there[:, others] | (densities == 0)] = -np.inf
+    found[alike, 1] = -densities.max(axis=1, initial=-np.inf)
+    return found
 
 
 def _samples(d: Detections) -> NDArray[np.int64]:
