@@ -37,7 +37,7 @@ class JointPlaces {
   };
 
   // Begins a frame, with tracks ordered by row. `bonds_of(marker)` are the distances known of a
-  // marker, `r` is the variance of a measured coordinate.
+  // marker.
   template <typename BondsOf>
   void begin(std::span<const Track> tracks, std::size_t n_rows, int D,
              BondsOf&& bonds_of) {

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 __all__ = ["fit_body_motion"]
 
-N_FITS = 2
-"""Number of fits, each to tracks found with the one before."""
 BETWEEN = 10.0
 """Ratio of the strongest to the weakest motion at the start, where a model has one motion."""
 
@@ -65,16 +63,17 @@ def fit_body_motion(
     fit = _start(model)
     if fit is None:
         return None
-    wide = (*fit.levels[:-1], WIDER * fit.levels[-1])
+    levels = (*fit.levels[:-1], WIDER * fit.levels[-1])
     n_axes = detections.n_axes
-    fitted = _with(model, dataclasses.replace(fit, noise=MIN_NOISE, levels=wide), n_axes)
+    wide = _with(model, dataclasses.replace(fit, noise=MIN_NOISE, levels=levels), n_axes)
     bounds = FitBounds(min_noise=MIN_NOISE, max_acceleration=math.inf)
     method = SMP(window=3, rigid=Rigidity())
-    for _ in range(N_FITS):
-        tracks = associate(method, detections, fitted, score=False)
-        fit = fit_motion(tracks, fitted, fit, bounds, refine=True)
-        fitted = _with(model, fit, n_axes)
-    return fitted, tracks
+    rough = associate(method, detections, wide, score=False)
+    fit = fit_motion(rough, wide, fit, bounds, refine=True)
+    fitted = _with(model, fit, n_axes)
+    tracks = associate(method, detections, fitted, score=False)
+    fit = fit_motion(tracks, fitted, fit, bounds, refine=True)
+    return _with(model, fit, n_axes), tracks
 
 
 def _start(model: TrackingModel) -> MotionFit | None:
