@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -93,20 +92,18 @@ def after_slow_start(tracks: Tracks, detections: Detections) -> Tracks:
     --------
     >>> import asterism as am
     >>> truth = am.simulate.cube(frames=40, seed=1)
-    >>> d = with_slow_start(truth)
-    >>> after_slow_start(am.track(d, am.GNN()), truth.detections)
-    Tracks(8 tracks, 320 detections in them, 0 clutter, 40 frames)
+    >>> tracks = am.track(with_slow_start(truth), am.GNN())
+    >>> tracks.detections.n_frames, after_slow_start(tracks, truth.detections).detections.n_frames
+    (196, 40)
     """
     own = slice(-detections.n_points, None)
     labels = tracks.labels[own].copy()
     is_track = labels >= 0
     labels[is_track] = np.unique(labels[is_track], return_inverse=True)[1]
-    confidence = None if tracks.confidence is None else tracks.confidence[own]
-    n_tracks = int(labels.max(initial=-1)) + 1
-    return dataclasses.replace(
-        tracks,
+    return Tracks(
         detections=detections,
         labels=labels,
-        confidence=confidence,
-        names=(None,) * n_tracks,
+        confidence=None if tracks.confidence is None else tracks.confidence[own],
+        info=tracks.info,
+        recipe=tracks.recipe,
     )
