@@ -28,9 +28,10 @@ def scores(truth: am.Tracks) -> list[tuple[float, float]]:
     """Track in each way: IDF1 and switches for 1000 detections."""
     d = truth.detections
     model = am.estimate_model(d).model
-    bodies = fit_body_motion(d, model)
+    fitted = fit_body_motion(d, model)
+    bodies = model if fitted is None else fitted[0]
     found = [am.track(d, am.TOMHT(), model=model, stitch=True)]
-    found.append(am.track(d, am.TOMHT(rigid=Rigidity()), model=bodies or model, stitch=True))
+    found.append(am.track(d, am.TOMHT(rigid=Rigidity()), model=bodies, stitch=True))
     found.append(am.track(d))
     return [(e.idf1, e.switches_per_1000) for e in (am.evaluate(each, truth) for each in found)]
 

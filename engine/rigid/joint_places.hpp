@@ -20,6 +20,7 @@
 #include <tuple>
 #include <vector>
 
+#include "math/logarithm.hpp"
 #include "rigid/bond.hpp"
 #include "rigid/neighbours.hpp"
 #include "solve/connected_components.hpp"
@@ -36,7 +37,7 @@ class JointPlaces {
   };
 
   // Begins a frame, with tracks ordered by row. `bonds_of(marker)` are the distances known of a
-  // marker, `r` is the variance of a measured coordinate.
+  // marker.
   template <typename BondsOf>
   void begin(std::span<const Track> tracks, std::size_t n_rows, int D,
              BondsOf&& bonds_of) {
@@ -49,26 +50,23 @@ class JointPlaces {
       numbers_.push_back({tracks_[a].marker, a});
     }
     std::ranges::sort(numbers_);
-    links_.clear();
+    known_.clear();
     for (std::int32_t a = 0; a < static_cast<std::int32_t>(tracks_.size()); ++a) {
       near_.clear();
-      for (const Bond& bond : bonds_of(tracks_[a].marker)) {
-        const std::int32_t b = find(bond.other);
-        if (b == kNone || bond.n < kMinFrames) continue;
-        if (const Link link = linked(a, b, bond); link.V < kMaxSpread * kMaxSpread * bond.mean * bond.mean)
-          keep_smallest(near_, kMaxLinks, link);
-      }
-      links_.insert(links_.end(), near_.begin(), near_.end());
+      for (const Bond& bond : bonds_of(tracks_[a].marker)) add_known(a, bond);
+      known_.insert(known_.end(), near_.begin(), near_.end());
     }
     // A pair may be listed by both of its markers.
-    std::ranges::sort(links_, {}, [](const Link& link) { return std::tuple(link.a, link.b, link.V); });
-    const auto same = [](const Link& x, const Link& y) { return x.a == y.a && x.b == y.b; };
-    links_.erase(std::ranges::unique(links_, same).begin(), links_.end());
-    for (Link& link : links_) expect(link);
-    of_track_.assign(tracks_.size(), {});
-    for (std::int32_t e = 0; e < static_cast<std::int32_t>(links_.size()); ++e) {
-      of_track_[links_[e].a].push_back(e);
-      of_track_[links_[e].b].push_back(e);
+    std::ranges::sort(known_, {}, [](const Known& one) { return std::tuple(one.a, one.b, one.V); });
+    const auto same = [](const Known& x, const Known& y) { return x.a == y.a && x.b == y.b; };
+    known_.erase(std::ranges::unique(known_, same).begin(), known_.end());
+    links_.clear();
+    of_track_.resize(std::max(of_track_.size(), tracks_.size()));
+    for (std::vector<std::int32_t>& links : of_track_) links.clear();
+    for (const Known& one : known_) {
+      for (const std::int32_t end : {one.a, one.b})
+        of_track_[end].push_back(static_cast<std::int32_t>(links_.size()));
+      links_.push_back({one, ratio(one)});
     }
     place_.assign(tracks_.size(), nullptr);
   }
@@ -124,46 +122,60 @@ class JointPlaces {
   static constexpr double kDamping = 0.5;
   // Bounds of the effect of a bond, nats. A bond may break, and both predictions may be wrong.
   static constexpr double kLeast = -3, kMost = 8;
+  static constexpr double kLeastSquared = 0.0024787521766663585, kMostSquared = 8886110.520507872;  // e^2x
+  // Bound of a message, nats, and the loss if both tracks of a bond have the same detection. It is
+  // finite, so that the other bonds of a track can outweigh a wrong message.
   static constexpr double kMaxMessage = 20;
   static constexpr double kFreedom = 4;
 
-  struct Link {
-    std::int32_t a = 0, b = 0;  // tracks, a < b
-    double distance = 0, V = 0, ratio = 0;
-    std::size_t effects = 0, to_a = 0, to_b = 0;  // where those begin in the arrays of a frame
-    bool operator<(const Link& other) const {
+  // A distance between two tracks, a < b.
+  struct Known {
+    std::int32_t a = 0, b = 0;
+    double distance = 0, V = 0;
+    bool operator<(const Known& other) const {
       return std::tuple(V, a, b) < std::tuple(other.V, other.a, other.b);
     }
+  };
+  struct Link : Known {
+    double ratio = 0;
+    std::size_t effects = 0, to_a = 0, to_b = 0;  // where those begin in the arrays of a frame
   };
 
   std::int32_t find(std::int32_t marker) const {
     const auto at = std::ranges::lower_bound(numbers_, std::pair(marker, kNone));
     return at != numbers_.end() && at->first == marker ? at->second : kNone;
   }
-  Link linked(std::int32_t a, std::int32_t b, const Bond& bond) const {
-    Link link{std::min(a, b), std::max(a, b), bond.mean};
+  // Adds a bond of track a to `near_` if it is among the kMaxLinks steadiest. The other marker is
+  // looked up last, because most bonds are refused before.
+  void add_known(std::int32_t a, const Bond& bond) {
+    if (bond.n < kMinFrames) return;
     const double n = static_cast<double>(std::min(bond.n, kMemory)), prior = kSteady * bond.mean;
-    link.V = (n * bond.variance + prior * prior * kPriorFrames) / (n + kPriorFrames);
-    return link;
+    const double V = (n * bond.variance + prior * prior * kPriorFrames) / (n + kPriorFrames);
+    if (!(V < kMaxSpread * kMaxSpread * bond.mean * bond.mean)) return;
+    if (near_.size() == kMaxLinks && V > near_.back().V) return;
+    const std::int32_t b = find(bond.other);
+    if (b != kNone) keep_smallest(near_, kMaxLinks, {std::min(a, b), std::max(a, b), bond.mean, V});
   }
   double distance(const Point& x, const Point& y) const {
     return std::sqrt(squared_distance(x, y, D_));
   }
-  // Sets the square of the likelihood ratio of the bond's own distance.
-  void expect(Link& link) const {
-    const Track &a = tracks_[link.a], &b = tracks_[link.b];
-    const double spread = link.V + a.variance + b.variance;
-    const double off = distance(a.center, b.center) - link.distance;
-    link.ratio = spread / link.V * tail(off, spread);
+  // The square of the likelihood ratio of the bond's own distance.
+  double ratio(const Known& one) const {
+    const Track &a = tracks_[one.a], &b = tracks_[one.b];
+    const double spread = one.V + a.variance + b.variance;
+    return spread / one.V * tail(distance(a.center, b.center) - one.distance, spread);
   }
   // Density of t at the mean over that at `off`, squared: (1 + x² / ν s²)^(ν + 1).
   static double tail(double off, double variance) {
     const double base = 1 + off * off / (kFreedom * variance);
     return base * base * base * base * base;
   }
+  // Most pairs of detections have an effect at a bound, for which no logarithm is needed.
   double effect(const Link& link, const Point& x, const Point& y) const {
-    const double off = distance(x, y) - link.distance;
-    return std::clamp(0.5 * std::log(link.ratio / tail(off, link.V)), kLeast, kMost);
+    const double squared = link.ratio / tail(distance(x, y) - link.distance, link.V);
+    if (squared <= kLeastSquared) return kLeast;
+    if (squared >= kMostSquared) return kMost;
+    return 0.5 * logarithm(squared);
   }
   std::size_t n_of(std::int32_t a) const { return first_[a + 1] - first_[a]; }
 
@@ -203,20 +215,21 @@ class JointPlaces {
       for (std::size_t l = 0; l < n_of(link.b); ++l) beliefs_[first_[link.b] + l] += messages_[link.to_b + l];
     }
   }
-  // The message of track `from` about the n detections of another. Without a detection of either
-  // track the bond has no effect.
+  // The message of track `from` about the n detections of another track. What that track has sent
+  // about the detections of `from` begins at `received` and is left out. The message begins at
+  // `sent`. Without a detection of either track the bond has no effect.
   template <typename Effect>
-  void send(std::int32_t from, std::size_t n_from, std::size_t heard, std::size_t n,
-            std::size_t said, double share, Effect&& effect_of) {
+  void send(std::int32_t from, std::size_t n_from, std::size_t received, std::size_t n,
+            std::size_t sent, double share, Effect&& effect_of) {
     double none = 0;
     for (std::size_t l = 0; l < n_from; ++l)
-      none = std::max(none, beliefs_[first_[from] + l] - messages_[heard + l]);
+      none = std::max(none, beliefs_[first_[from] + l] - messages_[received + l]);
     for (std::size_t j = 0; j < n; ++j) {
       double best = 0;
       for (std::size_t l = 0; l < n_from; ++l)
-        best = std::max(best, effect_of(j, l) + beliefs_[first_[from] + l] - messages_[heard + l]);
-      const double said_now = std::clamp(best - none, -kMaxMessage, kMaxMessage);
-      next_[said + j] = messages_[said + j] + share * (said_now - messages_[said + j]);
+        best = std::max(best, effect_of(j, l) + beliefs_[first_[from] + l] - messages_[received + l]);
+      const double message = std::clamp(best - none, -kMaxMessage, kMaxMessage);
+      next_[sent + j] = messages_[sent + j] + share * (message - messages_[sent + j]);
     }
   }
 
@@ -224,7 +237,8 @@ class JointPlaces {
   std::vector<Track> tracks_;
   std::vector<std::int32_t> at_row_, order_;
   std::vector<std::pair<std::int32_t, std::int32_t>> numbers_;  // markers and their tracks
-  std::vector<Link> links_, near_;
+  std::vector<Known> known_, near_;
+  std::vector<Link> links_;
   std::vector<std::vector<std::int32_t>> of_track_;
   std::vector<std::size_t> first_;  // candidate of each track
   std::vector<double> beliefs_, effects_, messages_, next_;

@@ -121,6 +121,31 @@ def test_two_markers_are_decided_as_by_enumeration():
     assert same == 400
 
 
+def effect_of(scene, bond):
+    """The effect of a bond, from the gain at which the second of two tracks loses its detection."""
+    low, high = -20.0, 20.0
+    while high - low > 1e-11:
+        gain = (low + high) / 2
+        has_place = decided({**scene, "gains": np.array([50.0, gain])}, [bond])[1] == 1
+        low, high = (low, gain) if has_place else (gain, high)
+    return -low
+
+
+@pytest.mark.parametrize("error", [0, 1e-4, 1e-3, 3e-3, 0.01, 0.02, 0.03, 0.05, 0.08, 0.3])
+def test_the_effect_of_a_bond_is_that_of_the_formula(error):
+    # Errors from none to large ones, of distances from precise to vague, beyond both bounds.
+    for spread in (1e-4, 1e-3, 0.02, 0.5):
+        scene = {
+            "centers": np.array([[0, 0, 0], [0.2 + spread, 0, 0]]),
+            "track_variances": np.array([spread**2, 2 * spread**2]),
+            "points": np.array([[0, 0, 0], [0.2 + error, 0, 0]]),
+            "rows": np.arange(2, dtype=np.int32),
+            "columns": np.arange(2, dtype=np.int32),
+        }
+        bond = (0, 1, 300, 0.2, 1e-6)
+        assert effect_of(scene, bond) == pytest.approx(effects(scene, bond)[0, 1], abs=1e-9)
+
+
 @pytest.mark.parametrize("seed", range(40))
 def test_a_chain_of_bonds_is_decided_as_by_enumeration(seed):
     # Without cycles messages are exact once they are settled, but for detections in two tracks that

@@ -7,6 +7,7 @@ import functools
 import json
 import tomllib
 from types import SimpleNamespace
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -14,8 +15,14 @@ import pytest
 import asterism as am
 from asterism.cli import main
 from asterism.simulate import Burst
-from asterism.tracking.attempts import Uncorrected, refined_by_own_distances
-from asterism.tracking.choose import partners
+from asterism.tracking.attempts import (
+    Uncorrected,
+    _has_bonds,
+    attempt,
+    most_certain,
+    refined_by_own_distances,
+)
+from asterism.tracking.choose import ON_BODIES, partners
 
 
 def sensed(truth, noise=0.005, **more):
@@ -121,15 +128,12 @@ def test_parts_that_moved_by_their_own_distances_are_joins():
     truth = am.simulate.corrupt(run, missing=0.1, clutter=0.1, noise=3e-4, stride=4, seed=14)
     tracks = am.track(truth.detections)
     assert tracks.info["refinements"] > 0
-    model = am.tracking.tracklet_model(tracks.recipe.model)
-    method = am.tracking.method_by_name(tracks.recipe.method, **tracks.recipe.options)
-    tracklets = am.track(truth.detections, method, model=model, seed=0)
-    before = am.stitch(tracklets, model).tracks
+    before = attempt(tracks.recipe, truth.detections).tracks
     order, offsets = before.by_track
     then = np.split(tracks.labels[order], offsets[1:-1])
     main = np.array([np.bincount(own[own >= 0]).argmax() for own in then])
     moved = order[main[before.labels[order]] != tracks.labels[order]]
-    assert len(moved) > 10
+    assert len(moved) > 5
     joins = {(each.track, each.last) for each in tracks.decisions if each.kind == "join"}
     assert len(joins) == tracks.info["joins"]
     for k in np.unique(tracks.labels[moved]):
@@ -152,6 +156,53 @@ def test_bonds_track_fast_motion_at_a_low_rate():
     assert am.evaluate(alone, truth).idf1 < 0.95
     again = am.tracking.carry_out(tracks.recipe, truth.detections).tracks
     assert np.array_equal(again.labels, tracks.labels)
+
+
+@pytest.mark.parametrize("stride", [4, 6])
+def test_bodies_are_seen_where_markers_move_beyond_their_neighbours(stride):
+    run = am.simulate.person(activity="run", frames=600, seed=13)
+    truth = am.simulate.corrupt(run, missing=0.1, clutter=0.1, noise=3e-4, stride=stride, seed=13)
+    model = am.estimate_model(truth.detections).model
+    alone = am.track(truth.detections, am.GNN(), model=model)
+    n_rigid, n_compared = partners(alone, model.sensor.noise_sigma)
+    choice = am.tracking.choose_method(truth.detections, model)
+    assert (choice.method.name, choice.stitch) == ("smp", True)
+    if stride == 6:
+        assert n_rigid < ON_BODIES * n_compared
+
+
+def test_bonds_find_no_bodies_among_independent_markers(monkeypatch):
+    monkeypatch.setattr("asterism.tracking.choose.CONFUSED", 0.0)
+    truth, model = clip("independent and dense")
+    choice = am.tracking.choose_method(truth.detections, model)
+    assert (choice.method.name, choice.stitch) == ("mcmcda", False)
+
+
+class Planned(Uncorrected):
+    """Tracks of which a share is expected to be right that depends on the method alone."""
+
+    shares: ClassVar[dict[str, float]] = {}
+
+    @property
+    def expected_right(self):
+        way = "bonds" if self.recipe.options.get("rigid") else self.recipe.method
+        return self.shares[way] * len(self.tracks.labels)
+
+
+@pytest.mark.parametrize(("gain", "is_kept"), [(0.001, False), (0.003, True)])
+def test_bonds_must_make_identities_more_certain_by_a_margin(gain, is_kept, monkeypatch):
+    walk = am.simulate.person(activity="walk", frames=60, seed=1)
+    plan = am.tracking.plan_tracking(walk.detections)
+    monkeypatch.setattr(Planned, "shares", {"smp": 0.8, "tomht": 0.9, "bonds": 0.9 + gain})
+
+    def planned(recipe, *_, **__):
+        return Planned(tracks=walk, recipe=recipe, model=recipe.model)
+
+    monkeypatch.setattr("asterism.tracking.attempts.attempt", planned)
+    monkeypatch.setattr("asterism.tracking.attempts.next_pass", lambda found: found)
+    monkeypatch.setattr("asterism.tracking.attempts.refined_by_own_distances", lambda found: found)
+    best = most_certain(plan.recipe, walk.detections)
+    assert (best.recipe.method, _has_bonds(best.recipe)) == ("tomht", is_kept)
 
 
 def test_the_progress_of_both_methods_is_one(fast):

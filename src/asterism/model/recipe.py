@@ -104,6 +104,9 @@ class Recipe:
         Whether identities that are uncertain are estimated in further ways: by another method, and
         by a marker set learnt from the tracks. The most certain result is kept, and its recipe
         names the method that made it.
+    passes : int
+        Number of passes of the method over the capture. Before each further pass it learns bonds
+        from the tracks of the pass before.
 
     Examples
     --------
@@ -131,6 +134,7 @@ class Recipe:
     input_hash: InputHash
     versions: dict[str, str]
     retry: bool = False
+    passes: int = 1
 
     @property
     def sha256(self) -> str:
@@ -139,9 +143,10 @@ class Recipe:
 
     @property
     def label(self) -> str:
-        """Method in a few words, with the number of frames of `SMP`."""
+        """Method in a few words, with the number of frames of `SMP` and of several passes."""
         window = self.options.get("window")
-        return f"{self.method}, window={window}" if self.method == "smp" and window else self.method
+        frames = f", window={window}" if self.method == "smp" and window else ""
+        return self.method + frames + (f", {self.passes} passes" if self.passes > 1 else "")
 
     @property
     def chosen(self) -> str:
@@ -167,6 +172,7 @@ class Recipe:
                 "start": self.has_start,
                 "stitch": self.stitch,
                 "retry": self.retry,
+                "passes": self.passes,
                 **({"reason": self.reason} if self.reason else {}),
                 # TOML has no null value.
                 "options": _replaced(self.options, None, NONE),
@@ -201,10 +207,12 @@ class Recipe:
         check_fields("recipe", map(str, values), sections)
         method, names = _table(values, "method"), _table(values, "names")
         check_fields("names", map(str, names), ("markers", "edits", "fill"))
-        keys = ("name", "seed", "start", "stitch", "retry", "reason", "options")
+        keys = ("name", "seed", "start", "stitch", "retry", "passes", "reason", "options")
         check_fields("method", map(str, method), keys)
         if (seed := method.get("seed")) is not None:
             check_number("method.seed", seed, above=0, closed=True, integer=True)
+        passes = method.get("passes", 1)
+        check_number("method.passes", passes, above=1, closed=True, integer=True)
         return cls(
             method=_value(method, "method.name", str),
             options=_replaced(_table(method, "options"), NONE, None),
@@ -219,6 +227,7 @@ class Recipe:
             input_hash=InputHash(_value(_table(values, "input"), "input.sha256", str)),
             versions={str(k): str(v) for k, v in _table(values, "versions").items()},
             retry=_value({"retry": False, **method}, "method.retry", bool),
+            passes=passes,
         )
 
 

@@ -19,6 +19,7 @@ from asterism.tracking.estimation import fit_body_motion
 from asterism.tracking.methods import METHODS, TOMHT, Rigidity, method_by_name, options_of
 from asterism.tracking.methods.associate import associate
 from asterism.tracking.naming import learn_marker_set, name_tracks
+from asterism.tracking.slow_start import after_slow_start, with_slow_start
 from asterism.tracking.stitching import stitch, tracklet_model
 from asterism.tracking.stitching.exchanged import with_markers
 
@@ -35,6 +36,8 @@ __all__ = ["Uncorrected", "attempt", "most_certain", "refined_by_own_distances"]
 DOUBTFUL = 0.002
 """Share of the detections whose identity is expected to be wrong, from which there are further
 attempts."""
+MAX_PASSES = 4
+"""Largest number of passes over the capture."""
 MAX_ROUNDS = 4
 """Largest number of marker sets that are learnt from the tracks, each from the tracks that the one
 before has named."""
@@ -108,15 +111,40 @@ def attempt(
     """
     made = method_by_name(recipe.method, **recipe.options) if method is None else method
     model = tracklet_model(recipe.model) if recipe.stitch else recipe.model
-    carried = recipe if made.name in METHODS else None
+    first = dataclasses.replace(recipe, passes=1)
     # Stitched tracks have no log posterior.
     tracks = associate(
-        made, detections, model, seed=recipe.seed, start=start, recipe=carried,
+        made, detections, model, seed=recipe.seed, start=start,
+        recipe=first if made.name in METHODS else None,
         score=not recipe.stitch, progress=progress,
     )  # fmt: skip
+    found = _stitched(tracks, first, model)
+    for _ in range(1, recipe.passes):
+        found = next_pass(refined_by_own_distances(found))
+    return found
+
+
+def next_pass(found: Uncorrected) -> Uncorrected:
+    """Associate a capture once more by the same method, which first learns bonds from the tracks.
+
+    Parameters
+    ----------
+    found : Uncorrected
+        Tracks of the pass before, without names.
+    """
+    recipe = dataclasses.replace(found.recipe, passes=found.recipe.passes + 1)
+    made = method_by_name(recipe.method, **recipe.options)
+    slow = associate(
+        made, with_slow_start(found.tracks), found.model, seed=recipe.seed, recipe=recipe,
+        score=False,
+    )  # fmt: skip
+    return _stitched(after_slow_start(slow, found.tracks.detections), recipe, found.model)
+
+
+def _stitched(tracks: Tracks, recipe: Recipe, model: TrackingModel) -> Uncorrected:
     stitching = stitch(tracks, model) if recipe.stitch else None
     if stitching is not None:
-        tracks = dataclasses.replace(stitching.tracks, recipe=carried)
+        tracks = dataclasses.replace(stitching.tracks, recipe=tracks.recipe)
     return Uncorrected(tracks=tracks, recipe=recipe, model=model, stitching=stitching)
 
 
@@ -132,8 +160,9 @@ def most_certain(
 
     The first is by the method of the recipe, the second by `TOMHT`. The third is by `TOMHT` with
     `Rigidity` and the motion of `fit_body_motion`. It must be more certain by `DOUBTFUL`, because
-    it uses distances as the confidence does. `refined_by_own_distances` follows. For `progress`,
-    the first method is half of the work.
+    it uses distances as the confidence does. `refined_by_own_distances` follows, and after the
+    third attempt further passes (`next_pass`), until one is not more certain. For `progress`, the
+    first method is half of the work.
 
     Parameters
     ----------
@@ -152,13 +181,22 @@ def most_certain(
     if best.is_doubtful and recipe.method != TOMHT.name:  # else it is that of a further attempt
         other = _by(TOMHT(), recipe, detections, lambda done: advance((2 * n + done) // 4))
         best = _more_certain(best, other, 0)
-        if best.is_doubtful and (model := fit_body_motion(detections, recipe.model)) is not None:
-            bodies, method = dataclasses.replace(recipe, model=model), TOMHT(rigid=Rigidity())
+        if best.is_doubtful and (fitted := fit_body_motion(detections, recipe.model)) is not None:
+            bodies, method = dataclasses.replace(recipe, model=fitted[0]), TOMHT(rigid=Rigidity())
             other = _by(method, bodies, detections, lambda done: advance((3 * n + done) // 4))
             best = _more_certain(best, other, DOUBTFUL * detections.n_points)
     best = refined_by_own_distances(best)
+    while best.is_doubtful and best.recipe.passes < MAX_PASSES and _has_bonds(best.recipe):
+        again = _more_certain(best, refined_by_own_distances(next_pass(best)), 0)
+        if again is best:
+            break
+        best = again
     advance(n)
     return best
+
+
+def _has_bonds(recipe: Recipe) -> bool:
+    return recipe.options.get("rigid") is not None
 
 
 def _by(

@@ -14,6 +14,7 @@ import numpy as np
 from asterism.checks import check_kind
 from asterism.model import Detections, RandomWalk, TrackingModel, Tracks
 from asterism.records import record
+from asterism.tracking.estimation import fit_body_motion
 from asterism.tracking.methods.gnn import GNN
 from asterism.tracking.methods.mcmcda import MCMCDA
 from asterism.tracking.methods.smp import SMP
@@ -45,6 +46,10 @@ ON_BODIES = 0.2
 because the wrong tracks after bursts of missed detections have no partner."""
 CLEAR = 0.01
 """Largest number of rival detections per link at which the association is unambiguous."""
+
+CONFUSED = 1.0
+"""Smallest number of rival detections per link at which the tracks of GNN do not tell whether there
+are bodies, so that `fit_body_motion` does."""
 
 
 @record
@@ -124,10 +129,8 @@ def choose_method(
     state, labels, _ = method.run(method.init(model, n_axes=detections.n_axes), detections)
     labels.flags.writeable = False  # no other object refers to it: no need to copy
     tracks = Tracks(detections=detections, labels=labels)
-    n_rigid, n_compared = partners(tracks, model.sensor.noise_sigma)
-    if n_compared and n_rigid >= ON_BODIES * n_compared:
-        reason = f"{n_rigid} of {n_compared} tracks have a stable distance to another: bodies"
-        return Choice(method=SMP(window=3), stitch=True, reason=reason)
+    if bodies := _bodies(tracks, model):
+        return bodies
     if any(isinstance(mode, RandomWalk) for mode in model.motion.modes):
         return Choice(
             method=MCMCDA(), stitch=False, reason="the motion is a random walk, no bodies"
@@ -138,8 +141,21 @@ def choose_method(
     rivals = max(state.info["candidates"] / max(n_links, 1) - 1, 0.0)
     rate = f"{100 * rivals:.1f} rival detections in the gates per 100 links, no bodies"
     if rivals > CLEAR:
-        return Choice(method=MCMCDA(), stitch=False, reason=rate)
+        # Markers that move by more than the distance to their neighbours have no stable distances
+        # in tracks of GNN.
+        fitted = fit_body_motion(detections, model) if rivals > CONFUSED else None
+        bodies = None if fitted is None else _bodies(fitted[1], fitted[0])
+        return bodies or Choice(method=MCMCDA(), stitch=False, reason=rate)
     return Choice(method=method, stitch=False, reason=rate)
+
+
+def _bodies(tracks: Tracks, model: TrackingModel) -> Choice | None:
+    """Return the choice for markers on bodies, None if too few tracks have a rigid partner."""
+    n_rigid, n_compared = partners(tracks, model.sensor.noise_sigma)
+    if not n_compared or n_rigid < ON_BODIES * n_compared:
+        return None
+    reason = f"{n_rigid} of {n_compared} tracks have a stable distance to another: bodies"
+    return Choice(method=SMP(window=3), stitch=True, reason=reason)
 
 
 def partners(tracks: Tracks, noise_sigma: float) -> tuple[int, int]:

@@ -11,26 +11,28 @@ from asterism.tracking.estimation.estimate import MIN_NOISE, WIDER
 from asterism.tracking.estimation.fitted_motion import MotionFit
 from asterism.tracking.estimation.motion_fit import FitBounds, fit_motion
 from asterism.tracking.methods.associate import associate
-from asterism.tracking.methods.gnn import GNN
 from asterism.tracking.methods.options import Rigidity
+from asterism.tracking.methods.smp import SMP
 
 if TYPE_CHECKING:
-    from asterism.model import Detections, TrackingModel
+    from asterism.model import Detections, TrackingModel, Tracks
 
 __all__ = ["fit_body_motion"]
 
-N_FITS = 2
-"""Number of fits, each to tracks found with the one before."""
 BETWEEN = 10.0
 """Ratio of the strongest to the weakest motion at the start, where a model has one motion."""
 
 
-def fit_body_motion(detections: Detections, model: TrackingModel) -> TrackingModel | None:
-    """Fit noise and motion of a model to tracks of markers on bodies, by `GNN` with `Rigidity`.
+def fit_body_motion(
+    detections: Detections, model: TrackingModel
+) -> tuple[TrackingModel, Tracks] | None:
+    """Fit noise and motion of a model to tracks of markers on bodies, by `SMP` with `Rigidity`.
 
     `estimate_model` admits no acceleration by which a marker could reach its neighbour, because it
     could not tell it from a wrong link, and explains faster motion as noise. Bonds between markers
-    tell them apart, so that there is no such bound here.
+    tell them apart, so that there is no such bound here. `SMP` considers three frames: in tracks of
+    single frames so many links of fast markers are wrong that the fitted motion grows with each
+    fit.
 
     Parameters
     ----------
@@ -41,8 +43,12 @@ def fit_body_motion(detections: Detections, model: TrackingModel) -> TrackingMod
 
     Returns
     -------
-    TrackingModel or None
-        Model with three motions; None if the markers move in random walks.
+    model : TrackingModel
+        Model with three motions.
+    tracks : Tracks
+        Tracks to which it was fitted.
+
+    If the markers move in random walks, the result is None.
 
     Examples
     --------
@@ -50,22 +56,24 @@ def fit_body_motion(detections: Detections, model: TrackingModel) -> TrackingMod
     >>> from asterism.tracking.estimation import fit_body_motion
     >>> truth = am.simulate.person(frames=100, seed=1)
     >>> model = am.estimate_model(truth.detections).model
-    >>> len(fit_body_motion(truth.detections, model).motion.models)
-    3
+    >>> fitted, tracks = fit_body_motion(truth.detections, model)
+    >>> len(fitted.motion.models), tracks.n_tracks
+    (3, 53)
     """
     fit = _start(model)
     if fit is None:
         return None
-    wide = (*fit.levels[:-1], WIDER * fit.levels[-1])
+    levels = (*fit.levels[:-1], WIDER * fit.levels[-1])
     n_axes = detections.n_axes
-    fitted = _with(model, dataclasses.replace(fit, noise=MIN_NOISE, levels=wide), n_axes)
+    wide = _with(model, dataclasses.replace(fit, noise=MIN_NOISE, levels=levels), n_axes)
     bounds = FitBounds(min_noise=MIN_NOISE, max_acceleration=math.inf)
-    method = GNN(rigid=Rigidity())
-    for _ in range(N_FITS):
-        tracks = associate(method, detections, fitted, score=False)
-        fit = fit_motion(tracks, fitted, fit, bounds, refine=True)
-        fitted = _with(model, fit, n_axes)
-    return fitted
+    method = SMP(window=3, rigid=Rigidity())
+    rough = associate(method, detections, wide, score=False)
+    fit = fit_motion(rough, wide, fit, bounds, refine=True)
+    fitted = _with(model, fit, n_axes)
+    tracks = associate(method, detections, fitted, score=False)
+    fit = fit_motion(tracks, fitted, fit, bounds, refine=True)
+    return _with(model, fit, n_axes), tracks
 
 
 def _start(model: TrackingModel) -> MotionFit | None:
