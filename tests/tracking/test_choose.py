@@ -199,7 +199,7 @@ def test_bonds_must_make_identities_more_certain_by_a_margin(gain, is_kept, monk
         return Planned(tracks=walk, recipe=recipe, model=recipe.model)
 
     monkeypatch.setattr("asterism.tracking.attempts.attempt", planned)
-    monkeypatch.setattr("asterism.tracking.attempts.next_pass", lambda found: found)
+    monkeypatch.setattr("asterism.tracking.attempts.next_pass", lambda found, _: found)
     monkeypatch.setattr("asterism.tracking.attempts.refined_by_own_distances", lambda found: found)
     best = most_certain(plan.recipe, walk.detections)
     assert (best.recipe.method, _has_bonds(best.recipe)) == ("tomht", is_kept)

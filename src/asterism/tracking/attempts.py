@@ -124,19 +124,27 @@ def attempt(
     return found
 
 
-def next_pass(found: Uncorrected) -> Uncorrected:
+def next_pass(found: Uncorrected, progress: Callable[[int], Any] | None = None) -> Uncorrected:
     """Associate a capture once more by the same method, which first learns bonds from the tracks.
 
     Parameters
     ----------
     found : Uncorrected
         Tracks of the pass before, without names.
+    progress : callable, optional
+        Called with the number of finished frames of the capture.
     """
     recipe = dataclasses.replace(found.recipe, passes=found.recipe.passes + 1)
     made = method_by_name(recipe.method, **recipe.options)
+    slow_start, n = with_slow_start(found.tracks), found.tracks.detections.n_frames
+
+    def advance(done: int) -> None:
+        if progress is not None:
+            progress(done * n // slow_start.n_frames)
+
     slow = associate(
-        made, with_slow_start(found.tracks), found.model, seed=recipe.seed, recipe=recipe,
-        score=False,
+        made, slow_start, found.model, seed=recipe.seed, recipe=recipe, score=False,
+        progress=advance,
     )  # fmt: skip
     return _stitched(after_slow_start(slow, found.tracks.detections), recipe, found.model)
 
@@ -162,36 +170,41 @@ def most_certain(
     `Rigidity` and the motion of `fit_body_motion`. It must be more certain by `DOUBTFUL`, because
     it uses distances as the confidence does. `refined_by_own_distances` follows, and after the
     third attempt further passes (`next_pass`), until one is not more certain. For `progress`, the
-    first method is half of the work.
+    first method is half of the work, and every other attempt or pass half of what is left.
 
     Parameters
     ----------
     recipe, detections, method, start, progress
         As for `carry_out`.
     """
-
-    def advance(done: int) -> None:
-        if progress is not None:
-            progress(done)
-
     n = detections.n_frames
-    best = attempt(
-        recipe, detections, method, start=start, progress=lambda done: advance(done // 2)
-    )
+
+    def half_of_rest(n_before: int) -> Callable[[int], None]:
+        """Return the progress of an attempt after so many others."""
+
+        def advance(done: int) -> None:
+            if progress is not None:
+                whole = 2 ** (n_before + 1)
+                progress(((whole - 2) * n + done) // whole)
+
+        return advance
+
+    best = attempt(recipe, detections, method, start=start, progress=half_of_rest(0))
     if best.is_doubtful and recipe.method != TOMHT.name:  # else it is that of a further attempt
-        other = _by(TOMHT(), recipe, detections, lambda done: advance((2 * n + done) // 4))
-        best = _more_certain(best, other, 0)
+        best = _more_certain(best, _by(TOMHT(), recipe, detections, half_of_rest(1)), 0)
         if best.is_doubtful and (fitted := fit_body_motion(detections, recipe.model)) is not None:
             bodies, method = dataclasses.replace(recipe, model=fitted[0]), TOMHT(rigid=Rigidity())
-            other = _by(method, bodies, detections, lambda done: advance((3 * n + done) // 4))
+            other = _by(method, bodies, detections, half_of_rest(2))
             best = _more_certain(best, other, DOUBTFUL * detections.n_points)
     best = refined_by_own_distances(best)
     while best.is_doubtful and best.recipe.passes < MAX_PASSES and _has_bonds(best.recipe):
-        again = _more_certain(best, refined_by_own_distances(next_pass(best)), 0)
+        again = next_pass(best, half_of_rest(2 + best.recipe.passes))
+        again = _more_certain(best, refined_by_own_distances(again), 0)
         if again is best:
             break
         best = again
-    advance(n)
+    if progress is not None:
+        progress(n)
     return best
 
 
