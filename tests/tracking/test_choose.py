@@ -124,8 +124,8 @@ def test_a_recipe_repeats_what_was_kept(fast):
 
 
 def test_parts_that_moved_by_their_own_distances_are_joins():
-    run = am.simulate.person(activity="run", frames=300, seed=14)
-    truth = am.simulate.corrupt(run, missing=0.1, clutter=0.1, noise=3e-4, stride=4, seed=14)
+    run = am.simulate.person(activity="run", frames=200, seed=13)
+    truth = am.simulate.corrupt(run, missing=0.1, clutter=0.1, noise=3e-4, stride=3, seed=13)
     tracks = am.track(truth.detections)
     assert tracks.info["refinements"] > 0
     before = attempt(tracks.recipe, truth.detections).tracks
