@@ -166,11 +166,12 @@ def most_certain(
 ) -> Uncorrected:
     """Make attempts while identities are uncertain, and return the most certain result.
 
-    The first is by the method of the recipe, the second by `TOMHT`. The third is by `TOMHT` with
-    `Rigidity` and the motion of `fit_body_motion`. It must be more certain by `DOUBTFUL`, because
-    it uses distances as the confidence does. `refined_by_own_distances` follows, and after the
-    third attempt further passes (`next_pass`), until one is not more certain. For `progress`, the
-    first method is half of the work, and every other attempt or pass half of what is left.
+    The first is by the method of the recipe, the second by `TOMHT`, unless the first has bonds. The
+    third is by `TOMHT` with `Rigidity` and the motion of `fit_body_motion`. It must be more certain
+    by `DOUBTFUL`, because it uses distances as the confidence does. `refined_by_own_distances`
+    follows, and after the third attempt further passes (`next_pass`), until one is not more
+    certain. For `progress`, the first method is half of the work, and every other attempt or pass
+    half of what is left.
 
     Parameters
     ----------
@@ -191,7 +192,8 @@ def most_certain(
 
     best = attempt(recipe, detections, method, start=start, progress=half_of_rest(0))
     if best.is_doubtful and recipe.method != TOMHT.name:  # else it is that of a further attempt
-        best = _more_certain(best, _by(TOMHT(), recipe, detections, half_of_rest(1)), 0)
+        if not _has_bonds(recipe):
+            best = _more_certain(best, _by(TOMHT(), recipe, detections, half_of_rest(1)), 0)
         if best.is_doubtful and (fitted := fit_body_motion(detections, recipe.model)) is not None:
             bodies, method = dataclasses.replace(recipe, model=fitted[0]), TOMHT(rigid=Rigidity())
             other = _by(method, bodies, detections, half_of_rest(2))

@@ -7,6 +7,7 @@ the association was ambiguous. The documentation (`Which method when`) measures 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from asterism.records import record
 from asterism.tracking.estimation import fit_body_motion
 from asterism.tracking.methods.gnn import GNN
 from asterism.tracking.methods.mcmcda import MCMCDA
+from asterism.tracking.methods.options import Rigidity
 from asterism.tracking.methods.smp import SMP
 from asterism.tracking.rigidity.distances import MIN_TOGETHER, distances_from
 
@@ -88,7 +90,8 @@ def choose_method(
 
     - Given initial tracks: `MCMCDA`, the only method that repairs them.
     - Markers that keep their distance to another one, as on bodies: `SMP` over three frames with
-      stitching, because neighbours predict where an occluded marker reappears.
+      stitching, because neighbours predict where an occluded marker reappears; with bonds where
+      they move so far that only bonds hold their tracks together.
     - Markers that move by a random walk, or that enter each other's gates: `MCMCDA`.
     - Any other capture is unambiguous: `GNN`.
 
@@ -144,8 +147,9 @@ def choose_method(
         # Markers that move by more than the distance to their neighbours have no stable distances
         # in tracks of GNN.
         fitted = fit_body_motion(detections, model) if rivals > CONFUSED else None
-        bodies = None if fitted is None else _bodies(fitted[1], fitted[0])
-        return bodies or Choice(method=MCMCDA(), stitch=False, reason=rate)
+        if fitted is not None and (bodies := _bodies(fitted[1], fitted[0])):
+            return replace(bodies, method=SMP(window=3, rigid=Rigidity()))
+        return Choice(method=MCMCDA(), stitch=False, reason=rate)
     return Choice(method=method, stitch=False, reason=rate)
 
 
