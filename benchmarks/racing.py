@@ -110,8 +110,8 @@ def main() -> None:
     is_nearest = nearest == np.arange(places.shape[1])
     model = am.estimate_model(d).model
     made: dict[str, tuple[Any, am.TrackingModel]] = {"TOMHT": (am.TOMHT(), model)}
-    if (bodies := fit_body_motion(d, model)) is not None:
-        made["TOMHT with bonds"] = am.TOMHT(rigid=Rigidity()), bodies
+    if (fitted := fit_body_motion(d, model)) is not None:
+        made["TOMHT with bonds"] = am.TOMHT(rigid=Rigidity()), fitted[0]
     rows = [["nearest to the prediction", f"{100 * is_nearest[known].mean():.1f} %"]]
     n_links = int((before(truth) >= 0).sum())
     tracks = truth
