@@ -2,11 +2,11 @@
 //
 //   g_i(j)   gain of track i from detection j; 0 without a detection
 //   d, V     distance of a bond and the squared scale of its next value, which has a Student's t
-//            distribution with as many degrees of freedom as frames were observed
+//            distribution with four degrees of freedom
 //   ŷ, S     predicted position of a track and its variance along an axis
 //   p(j, l)  effect of a bond of tracks i and k with detections j and l, which is the likelihood of
 //            their distance against what the predictions expect of it:
-//              log t_n(|y_j - y_l|; d, V) - log t_4(|ŷ_i - ŷ_k|; d, V + S_i + S_k)
+//              log t_4(|y_j - y_l|; d, V) - log t_4(|ŷ_i - ŷ_k|; d, V + S_i + S_k)
 //
 // The sum of all g and p is maximised by messages between bonded tracks (max-product). They are
 // damped and end after a few rounds, so that the maximum is approximate where bonds form cycles.
@@ -122,7 +122,7 @@ class JointPlaces {
   static constexpr double kDamping = 0.5;
   // Bounds of the effect of a bond, nats. A bond may break, and both predictions may be wrong.
   static constexpr double kLeast = -3, kMost = 8;
-  static constexpr double kLeastSquared = 0.0024787521766663585, kMostSquared = 8886110.520507872;  // e^2x
+  static inline const double kLeastSquared = std::exp(2 * kLeast), kMostSquared = std::exp(2 * kMost);
   // Bound of a message, nats, and the loss if both tracks of a bond have the same detection. It is
   // finite, so that the other bonds of a track can outweigh a wrong message.
   static constexpr double kMaxMessage = 20;

@@ -206,6 +206,27 @@ def test_bonds_must_make_identities_more_certain_by_a_margin(gain, is_kept, monk
     assert (best.recipe.method, _has_bonds(best.recipe)) == ("tomht", is_kept)
 
 
+def test_a_method_with_bonds_needs_no_attempt_without_them(monkeypatch):
+    walk = am.simulate.person(activity="walk", frames=60, seed=1)
+    recipe = am.tracking.plan_tracking(walk.detections).recipe
+    recipe = dataclasses.replace(recipe, options={**recipe.options, "rigid": {}})
+    monkeypatch.setattr(Planned, "shares", {"smp": 0.8, "tomht": 0.9, "bonds": 0.9})
+    made = []
+
+    def planned(recipe, *_, **__):
+        made.append((recipe.method, _has_bonds(recipe)))
+        return Planned(tracks=walk, recipe=recipe, model=recipe.model)
+
+    monkeypatch.setattr("asterism.tracking.attempts.attempt", planned)
+    monkeypatch.setattr("asterism.tracking.attempts.next_pass", lambda found, _: found)
+    monkeypatch.setattr("asterism.tracking.attempts.refined_by_own_distances", lambda found: found)
+    most_certain(recipe, walk.detections)
+    assert made == [("smp", True), ("tomht", True)]
+    made.clear()
+    most_certain(dataclasses.replace(recipe, passes=2), walk.detections)
+    assert made == [("smp", True)]
+
+
 def test_the_progress_of_both_methods_is_one(fast):
     truth, _ = fast
     n, done = truth.detections.n_frames, []

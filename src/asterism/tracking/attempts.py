@@ -191,7 +191,8 @@ def most_certain(
         return advance
 
     best = attempt(recipe, detections, method, start=start, progress=half_of_rest(0))
-    if best.is_doubtful and recipe.method != TOMHT.name:  # else it is that of a further attempt
+    # By `TOMHT`, or after a further pass, the recipe is already that of a further attempt.
+    if best.is_doubtful and recipe.method != TOMHT.name and recipe.passes == 1:
         if not _has_bonds(recipe):
             best = _more_certain(best, _by(TOMHT(), recipe, detections, half_of_rest(1)), 0)
         if best.is_doubtful and (fitted := fit_body_motion(detections, recipe.model)) is not None:
