@@ -5,11 +5,13 @@
 #include <nanobind/ndarray.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <functional>
 #include <iterator>
 #include <memory>
 #include <span>
 #include <stdexcept>
+#include <vector>
 
 namespace nb = nanobind;
 
@@ -54,8 +56,19 @@ std::span<const T> flat(const In<T>& array) {
   return {array.data(), array.size()};
 }
 
+// The same values, of another type.
+template <typename To, typename From>
+std::vector<To> values_as(const In<From>& array) {
+  return {array.data(), array.data() + array.size()};
+}
+
 inline void require(bool holds, const char* what) {
   if (!holds) throw std::invalid_argument(what);
+}
+
+inline void require_within(std::span<const std::int32_t> values, std::int32_t least, std::int32_t n,
+                           const char* what) {
+  for (const std::int32_t x : values) require(x >= least && x < n, what);
 }
 
 // Checks that offsets start at 0 or above, increase, and end within n values.

@@ -19,6 +19,7 @@ NB_MODULE(_engine, module) {
   bind_stitcher(module);
   bind_reconstruct(module);
   bind_naming(module);
+  bind_name_windows(module);
   bind_confidence(module);
   bind_large(module);
 }

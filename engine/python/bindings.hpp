@@ -15,5 +15,6 @@ void bind_chain(nanobind::module_& module);
 void bind_stitcher(nanobind::module_& module);
 void bind_reconstruct(nanobind::module_& module);
 void bind_naming(nanobind::module_& module);
+void bind_name_windows(nanobind::module_& module);
 void bind_confidence(nanobind::module_& module);
 void bind_large(nanobind::module_& module);
