@@ -297,6 +297,20 @@ def test_one_statement_takes_the_probable_detections_of_its_marker_in_the_whole_
     assert found.labels[lost[1]] == -1  # it is stated to be of another marker
 
 
+def test_probable_ghosts_are_not_taken_along():
+    truth = am.simulate.person(activity="walk", frames=300, n_markers=40, seed=3)
+    d, labels = truth.detections, truth.labels.copy()
+    own = np.flatnonzero(labels == 4)
+    # All but the stated one are beyond those that continue it without a gap.
+    lost, ghosts = own[[40, 140, 160, 180, 200]], own[150:210:20]
+    labels[lost] = labels[ghosts] = -1
+    solver = Solver(am.Tracks(detections=d, labels=labels), am.estimate_model(d).model)
+    solver.evidence.ghost[ghosts] = 20.0
+    solver.solve(Edit(kind="same", at=at(d, own[0], lost[0])), Constraints(d))
+    assert (solver.labels[lost] == 4).all()
+    assert (solver.labels[ghosts] == -1).all()
+
+
 def test_a_part_on_two_markers_is_not_exchanged_as_a_whole():
     truth = am.simulate.person(activity="walk", frames=300, n_markers=40, seed=3)
     d, labels, frame = truth.detections, truth.labels.copy(), truth.detections.frame_of

@@ -59,8 +59,8 @@ def test_tracks_of_the_slow_start_alone_are_left_out():
     tracks = two_markers()
     slow = with_slow_start(tracks)
     labels = np.full(slow.n_points, -1)
-    labels[0] = 0  # a track of the slow start alone
-    labels[-6:] = [2, -1, 1, 2, 1, 3]
+    labels[0] = 1  # a track of the slow start alone
+    labels[-6:] = [2, -1, 0, 2, 0, 3]
     found = am.Tracks(detections=slow, labels=labels, confidence=np.linspace(0, 1, len(labels)))
     after = after_slow_start(found, tracks.detections)
     assert after.detections is tracks.detections
