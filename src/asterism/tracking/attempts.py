@@ -190,8 +190,9 @@ def most_certain(
 
         return advance
 
-    best = attempt(recipe, detections, method, start=start, progress=half_of_rest(0))
-    # By `TOMHT`, or after a further pass, the recipe is already that of a further attempt.
+    first = attempt(recipe, detections, method, start=start, progress=half_of_rest(0))
+    best = first
+    # A recipe by `TOMHT`, or with several passes, is that of a further attempt already.
     if best.is_doubtful and recipe.method != TOMHT.name and recipe.passes == 1:
         if not _has_bonds(recipe):
             best = _more_certain(best, _by(TOMHT(), recipe, detections, half_of_rest(1)), 0)
@@ -208,7 +209,7 @@ def most_certain(
         best = again
     if progress is not None:
         progress(n)
-    return best
+    return _with_reason(best, first)
 
 
 def _has_bonds(recipe: Recipe) -> bool:
@@ -223,17 +224,23 @@ def _by(
 
 
 def _more_certain(before: Uncorrected, other: Uncorrected, margin: float) -> Uncorrected:
-    """Return the other result with the reason, if it is more certain by a number of detections."""
-    if other.expected_right <= before.expected_right + margin:
-        return before
-    share, less = (100 * each.expected_right / len(each.tracks.labels) for each in (other, before))
+    """Return the other result if it is more certain by a number of detections."""
+    return other if other.expected_right > before.expected_right + margin else before
+
+
+def _with_reason(best: Uncorrected, first: Uncorrected) -> Uncorrected:
+    """Return the best result with the reason for it, if a further attempt made it."""
+    recipe, other = best.recipe, first.recipe
+    if (recipe.options, recipe.label) == (other.options, other.label):
+        return best
+    share, less = (100 * each.expected_right / len(each.tracks.labels) for each in (best, first))
     reason = (
-        f"{before.recipe.reason}; {share:.1f} % of the detections are expected to have the right "
-        f"identity, against {less:.1f} % with {before.recipe.label}"
+        f"{other.reason}; {share:.1f} % of the detections are expected to have the right "
+        f"identity, against {less:.1f} % with {other.label}"
     )
-    recipe = dataclasses.replace(other.recipe, reason=reason)
-    tracks = dataclasses.replace(other.tracks, recipe=recipe)
-    return dataclasses.replace(other, tracks=tracks, recipe=recipe)
+    recipe = dataclasses.replace(recipe, reason=reason)
+    tracks = dataclasses.replace(best.tracks, recipe=recipe)
+    return dataclasses.replace(best, tracks=tracks, recipe=recipe)
 
 
 def refined_by_own_distances(found: Uncorrected) -> Uncorrected:
