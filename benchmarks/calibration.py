@@ -1,9 +1,10 @@
 """Fit the constants of the confidence on simulated people, and check them on real captures.
 
 People walk, run, turn and jump, two walk through each other, and fingers move; for every second
-seed markers wobble, slip and move with posture; corrupted in five ways. Each part of a track
-between uncertain links is right if most of its detections are of the marker that holds most of the
-track; each exchange is right if the later part of one track belongs to the other. The logistic
+seed markers wobble, slip and move with posture; corrupted in six ways. Each part of a track between
+uncertain links, and each track without one, is right if most of its detections are of the marker
+that holds most of the track; each exchange is right if the later part of one track belongs to the
+other. The logistic
 functions of ``tracking/confidence/calibration.py`` are fitted by maximum likelihood. The check is
 of the captures of ``../shared/data`` (or ``--data``) in four conditions, without the detections
 with a wrong label in the file (`wrong.py`).
@@ -24,7 +25,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 import asterism as am
-from asterism.simulate import Burst, Ghosts
+from asterism.simulate import Burst, Ghosts, Visits
 from asterism.tracking.confidence import calibration
 from asterism.tracking.confidence.identity import Examined, examine
 from asterism.tracking.pipeline import without_edits
@@ -84,12 +85,24 @@ def bursts(truth: am.Tracks, seed: int, stride: int) -> am.Tracks:
     )
 
 
+VISITS = "bursts, visits"
+"""Markers that leave, which makes short tracks. One that returns counts as another one, which no
+join can know: only tracks without an uncertain link, and so without a join, are taken from it."""
+
+
+def visits(truth: am.Tracks, seed: int) -> am.Tracks:
+    return am.simulate.corrupt(
+        truth, burst=Burst(), ghosts=Ghosts(), visits=Visits(), noise=3e-4, seed=seed
+    )
+
+
 CORRUPTED: dict[str, Corrupt] = {
     "10 %/10 %": lambda truth, seed: missing(truth, seed, 1),
     "10 %/10 %, half rate": lambda truth, seed: missing(truth, seed, 2),
     "10 %/10 %, third of the rate": lambda truth, seed: missing(truth, seed, 3),
     "bursts": lambda truth, seed: bursts(truth, seed, 1),
     "bursts, half rate": lambda truth, seed: bursts(truth, seed, 2),
+    VISITS: visits,
 }
 
 
@@ -103,14 +116,19 @@ def tracked(
     return begun.tracks, begun.model, begun.stitching
 
 
-def parts_of(found: Examined, tracks: am.Tracks, truth: am.Tracks) -> tuple[Array, Array]:
-    """Return features of the parts that are not whole tracks, and whether each is right."""
+def parts_of(
+    found: Examined, tracks: am.Tracks, truth: am.Tracks
+) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    """Return features, and whether each is right, of the parts and of the whole tracks."""
     parts, evidence = found.parts, found.evidence
-    used = evidence.is_known & ~parts.is_whole(tracks.n_tracks)
+    is_whole = parts.is_whole(tracks.n_tracks)
+    used = evidence.is_known & ~is_whole
     wrong = is_wrong(tracks, truth)[tracks.by_track[0]]
-    right = 1 - np.add.reduceat(wrong, parts.offsets[:-1]) / parts.n_detections
+    share = 1 - np.add.reduceat(wrong, parts.offsets[:-1]) / parts.n_detections
+    right = (share > 0.5).astype(float)
     features = calibration.part_features(evidence, parts.weakest, parts.n_detections)
-    return features[used], (right > 0.5)[used].astype(float)
+    whole = calibration.track_features(parts.n_detections[is_whole])
+    return (features[used], right[used]), (whole, right[is_whole])
 
 
 def exchanges_of(found: Examined, truth: am.Tracks) -> tuple[Array, Array]:
@@ -190,23 +208,29 @@ def main() -> None:
     parser.add_argument("--markdown", type=Path)
     options = parser.parse_args()
     parts: list[tuple[Array, Array]] = []
+    whole: list[tuple[Array, Array]] = []
     exchanges: list[tuple[Array, Array]] = []
     reliability: dict[str, Reliability] = {}
     for name, truth in simulated(options.seeds):
         # Further attempts are chosen by the confidence that is fitted here.
         tracks, model, stitching = tracked(truth, retry=False)
         found = examine(tracks, model, stitching)
-        parts.append(parts_of(found, tracks, truth))
+        of_parts, of_tracks = parts_of(found, tracks, truth)
+        whole.append(of_tracks)
+        if name.endswith(VISITS):
+            continue
+        parts.append(of_parts)
         exchanges.append(exchanges_of(found, truth))
         own = reliability.setdefault("simulated people", Reliability())
         own.add(am.tracking.assess(tracks, model, stitching), truth)
         print(name, flush=True)
-    # All exchanges count the same, as most scenes have one or two. Parts count for less where a
-    # capture has more of them: one that is wrong throughout has a third of all.
+    # All exchanges and tracks count the same. Parts count for less where a capture has more of
+    # them: one that is wrong throughout has a third of all.
     counts = np.concatenate([np.full(len(right), len(right)) for _, right in parts])
     fitted = {
         "EXCHANGE": fit(*_together(exchanges), np.ones(sum(len(right) for _, right in exchanges))),
         "PART": fit(*_together(parts), 1 / counts),
+        "TRACK": fit(*_together(whole), np.ones(sum(len(right) for _, right in whole))),
     }
     for name, values in fitted.items():
         print(name, "=", _rounded(values), flush=True)

@@ -267,3 +267,18 @@ def test_a_c3d_lists_at_most_255_decisions(tmp_path):
     assert lines[0].startswith("identity ")
     am.write(replace(tracks, decisions=()), tmp_path / "a.c3d")
     assert "DECISIONS" not in ezc3d.c3d(str(tmp_path / "a.c3d"))["parameters"]
+
+
+def test_a_short_track_is_less_certain_than_a_long_one_and_is_listed():
+    t, positions = moving(np.random.default_rng(2).uniform(-0.3, 0.3, (6, 3)), 200, seed=4)
+    positions[8:, 5] = np.nan  # eight detections, as ghosts leave them
+    truth = am.Tracks.from_dense(t, positions, tuple("abcdef"))
+    tracks = assess(truth, small_model())
+    short = tracks.labels == 5
+    assert short.sum() == 8
+    assert tracks.identity_confidence[short].max() < 0.99
+    assert tracks.identity_confidence[~short].min() > 0.999
+    (own,) = (each for each in tracks.decisions if each.kind == "identity")
+    assert (own.track, own.first, own.last, own.n_detections) == (5, 0, 7, 8)
+    assert [other.track for other in own.alternatives] == [None]
+    assert own.probability == pytest.approx(tracks.identity_confidence[short][0])

@@ -14,11 +14,14 @@ if TYPE_CHECKING:
 __all__ = [
     "EXCHANGE",
     "PART",
+    "TRACK",
     "WHOLE",
     "exchange_features",
     "exchange_probability",
     "part_features",
     "part_probability",
+    "track_features",
+    "track_probability",
 ]
 
 EXCHANGE = (-1.54, 0.21, 0.76)
@@ -27,8 +30,11 @@ PART = (-1.46, 0.93, 0.64, 0.31, 0.28)
 """Log odds that a part is on the marker of its track: constant, and the factors of the margins of
 its distances over an unknown marker and over the best other track, of the log odds of the less
 certain link or join at its ends, and of the logarithm of its number of detections."""
+TRACK = (-0.31, 1.61)
+"""Log odds that a track without an uncertain link or join is of one marker, not of ghosts:
+constant, and factor of the logarithm of its number of detections."""
 WHOLE = 0.9999
-"""Probability of a part without an uncertain link or join."""
+"""Largest probability of an identity."""
 RATIOS = (-10.0, 10.0)
 """Bounds of the log-likelihood ratio of an exchange."""
 MARGINS = (-2.0, 4.0)
@@ -107,6 +113,28 @@ def part_probability(features: NDArray[np.float64]) -> NDArray[np.float64]:
         Result of `part_features`.
     """
     return _probability(features @ np.array(PART))
+
+
+def track_features(n_detections: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return what the probability of each whole track is computed from, shape (K, 2).
+
+    Parameters
+    ----------
+    n_detections : ndarray of int, shape (K,)
+        Number of detections of each track.
+    """
+    return np.column_stack([np.ones(len(n_detections)), np.log(np.maximum(n_detections, 1))])
+
+
+def track_probability(n_detections: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the probability that tracks without an uncertain link are of one marker.
+
+    Parameters
+    ----------
+    n_detections : ndarray of int, shape (K,)
+        As for `track_features`.
+    """
+    return _probability(track_features(n_detections) @ np.array(TRACK))
 
 
 def _probability(log_odds: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -14,6 +14,7 @@ from asterism.tracking.confidence.calibration import (
     WHOLE,
     part_features,
     part_probability,
+    track_probability,
 )
 from asterism.tracking.confidence.links import Exchanges, find_exchanges
 from asterism.tracking.confidence.parts import Evidence, Parts, compare, part_tracks
@@ -56,7 +57,8 @@ def assess(
     and with an unknown marker. The margin, the probabilities of the links at both ends and the
     length of the part give the probability, by a logistic function fitted on simulated people.
     Where tracks keep no distances, it is the product of the probabilities of the links between the
-    part and the longest part of the track.
+    part and the longest part of the track. A track without an uncertain link is of one marker with
+    a probability that rises with its length, because ghosts make short tracks.
 
     Parameters
     ----------
@@ -88,7 +90,7 @@ def assess(
     parts, order = found.parts, tracks.by_track[0]
     probability = _probability(parts, found.evidence, tracks.n_tracks)
     identity = np.where(tracks.labels >= 0, WHOLE, 0.0)
-    for p in np.flatnonzero(~parts.is_whole(tracks.n_tracks)):
+    for p in np.flatnonzero(probability < WHOLE):
         identity[order[parts.offsets[p] : parts.offsets[p + 1]]] = probability[p]
     identity.flags.writeable = False  # no other object refers to it: no need to copy
     confidence = tracks.confidence
@@ -238,7 +240,8 @@ def _probability(parts: Parts, evidence: Evidence, n_tracks: int) -> NDArray[np.
     """Return the probability that each part is on the marker of its track."""
     known = part_probability(part_features(evidence, parts.weakest, parts.n_detections))
     probability = np.where(evidence.is_known, known, _chained(parts, n_tracks))
-    return np.where(parts.is_whole(n_tracks), WHOLE, np.minimum(probability, WHOLE))
+    whole = track_probability(parts.n_detections)
+    return np.minimum(np.where(parts.is_whole(n_tracks), whole, probability), WHOLE)
 
 
 def _chained(parts: Parts, n_tracks: int) -> NDArray[np.float64]:
