@@ -30,7 +30,7 @@ PART = (-1.46, 0.93, 0.64, 0.31, 0.28)
 """Log odds that a part is on the marker of its track: constant, and the factors of the margins of
 its distances over an unknown marker and over the best other track, of the log odds of the less
 certain link or join at its ends, and of the logarithm of its number of detections."""
-TRACK = (-0.31, 1.61)
+TRACK = (-0.59, 1.65)
 """Log odds that a track without an uncertain link or join is of one marker, not of ghosts:
 constant, and factor of the logarithm of its number of detections."""
 WHOLE = 0.9999
