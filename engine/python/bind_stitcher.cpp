@@ -163,46 +163,6 @@ nb::tuple exchanged_stretches(const MotionModel& m, const In<double>& times,
                         array_of<double>(found, &ExchangedStretch::gain));
 }
 
-std::vector<RigidPair> to_pairs(const In<double>& a, const In<double>& b,
-                                const In<double>& weights) {
-  require(a.ndim() == 2 && a.shape(1) >= 1 && a.shape(1) <= kMaxAxes && b.ndim() == 2 &&
-              b.shape(0) == a.shape(0) && b.shape(1) == a.shape(1) && weights.ndim() == 1 &&
-              weights.size() == a.shape(0) && a.shape(0) > 0,
-          "a and b: shape (n, D); weights: shape (n,)");
-  const auto D = static_cast<int>(a.shape(1));
-  const std::vector<Point> from = to_points(a, D), to = to_points(b, D);
-  std::vector<RigidPair> pairs;
-  for (std::size_t k = 0; k < from.size(); ++k) pairs.push_back({from[k], to[k], weights.data()[k]});
-  return pairs;
-}
-
-// Returns (R, from, to, rms) of the rigid motion between two point sets.
-nb::tuple fit(const In<double>& a, const In<double>& b, const In<double>& weights) {
-  const RigidFit found = fit_rigid(to_pairs(a, b, weights), static_cast<int>(a.shape(1)));
-  return nb::make_tuple(array_of<double>(found.R, {3, 3}), array_of<double>(found.from),
-                        array_of<double>(found.to), found.rms);
-}
-
-// Returns (predicted position of what was at `then`, its variance in addition to `r`, log densities
-// at some points).
-nb::tuple carried(const In<double>& a, const In<double>& b, const In<double>& weights,
-                  const In<double>& then, double r, const In<double>& points) {
-  const std::vector<RigidPair> pairs = to_pairs(a, b, weights);
-  const auto D = static_cast<int>(a.shape(1));
-  const std::vector<Point> was = to_points(then, D), at = to_points(points, D);
-  require(was.size() == 1, "then: shape (1, D)");
-  Carried found;
-  RigidPredictions().each(
-      D, r, was,
-      [&](const Point& one, Point& at_then) {
-        at_then = one;
-        return std::span<const RigidPair>(pairs);
-      },
-      [&](const Point&, const RigidPrediction& prediction) { found = prediction.place(r, 1); });
-  const auto density = [&](const Point& y) { return found.log_density(y, D); };
-  return nb::make_tuple(array_of<double>(found.at), found.variance, array_of<double>(at, density));
-}
-
 // Background log density of each point of a frame, given earlier points.
 Out<double> background_densities(const In<double>& before, const In<double>& points, double noise,
                                 double ghost_radius) {
@@ -320,8 +280,6 @@ void bind_stitcher(nb::module_& module) {
   module.attr("BEND") = kBend;
   module.attr("MIN_TOGETHER") = kMinTogether;
   module.def("judge_distances", &judge_distances, "means"_a, "variances"_a, "frames"_a);
-  module.def("fit_rigid", &fit, "a"_a, "b"_a, "weights"_a);
-  module.def("carried", &carried, "a"_a, "b"_a, "weights"_a, "then"_a, "r"_a, "points"_a);
   module.def("background_densities", &background_densities, "before"_a, "points"_a, nb::kw_only(),
              "noise"_a, "ghost_radius"_a);
   nb::class_<Neighbours>(module, "Neighbours")

@@ -16,6 +16,7 @@ NB_MODULE(_engine, module) {
   bind_camera(module);
   bind_solvers(module);
   bind_chain(module);
+  bind_rigid(module);
   bind_stitcher(module);
   bind_reconstruct(module);
   bind_naming(module);

@@ -12,6 +12,7 @@ void bind_frame(nanobind::module_& module);
 void bind_camera(nanobind::module_& module);
 void bind_solvers(nanobind::module_& module);
 void bind_chain(nanobind::module_& module);
+void bind_rigid(nanobind::module_& module);
 void bind_stitcher(nanobind::module_& module);
 void bind_reconstruct(nanobind::module_& module);
 void bind_naming(nanobind::module_& module);

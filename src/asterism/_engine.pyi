@@ -464,6 +464,9 @@ def judge_distances(
 # (R, from, to, rms): b = R (a - from) + to, in three axes.
 def fit_rigid(a: Floats, b: Floats, weights: Floats) -> tuple[Floats, Floats, Floats, float]: ...
 
+# Rotations (F, D, D) of a shape (n, D) that fit its points (F n, D).
+def turns(shape: Floats, points: Floats, weights: Floats) -> Floats: ...
+
 # (last points before (n, 2), first points after (n, 2), log-likelihood ratios, frames)
 def exchanges(
     motion: MotionModel,

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from asterism._engine import turns
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -98,25 +100,19 @@ def fit_body(points: NDArray[np.float64], weights: NDArray[np.float64]) -> Body:
 
     References
     ----------
-    Horn 1987, J. Opt. Soc. Am. A 4(4); by singular values as Kabsch 1976, Acta Cryst. A 32.
+    Horn 1987, J. Opt. Soc. Am. A 4(4).
     """
     F, n, D = points.shape
-    turns = np.broadcast_to(np.eye(D), (F, D, D))
+    still = np.broadcast_to(np.eye(D), (F, D, D))
     if n == 0:
-        return Body(turns=turns, middles=np.zeros((F, D)))
+        return Body(turns=still, middles=np.zeros((F, D)))
     w = weights / weights.sum()
     middles = w @ points
     if n < D:
-        return Body(turns=turns, middles=middles)
+        return Body(turns=still, middles=middles)
     arms = points - middles[:, None]
     shape = arms[F // 2]
-    for i in range(ROUNDS + 1):
-        # A few frames are enough for the shape; the rotation is fitted in every frame.
-        chosen = arms[:: max(1, F // 200)] if i < ROUNDS else arms
-        U, _, Vt = np.linalg.svd(chosen.swapaxes(1, 2) @ (w[:, None] * shape))
-        flip = np.ones((len(chosen), D))
-        flip[:, -1] = np.sign(np.linalg.det(U) * np.linalg.det(Vt))  # excludes reflections
-        turns = (U * flip[:, None]) @ Vt
-        if i < ROUNDS:
-            shape = (chosen @ turns).mean(axis=0)
-    return Body(turns=turns, middles=middles)
+    some = arms[:: max(1, F // 200)]  # a few frames are enough for the shape
+    for _ in range(ROUNDS):
+        shape = (some @ turns(shape, some.reshape(-1, D), w)).mean(axis=0)
+    return Body(turns=turns(shape, arms.reshape(-1, D), w), middles=middles)
