@@ -90,6 +90,27 @@ class DenseTracks:
             found[span.frames, span.track] = states.means[at[span.track] + span.frames] @ H
         return found
 
+    def steadiest(self, track: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Return the tracks often detected with a track, and the spreads of their distances to it.
+
+        The steadiest one is the first; spreads are metres. What is found is kept for the next gap.
+        """
+        if track not in self._steadiest:
+            mine = np.flatnonzero(self.seen[:, track])
+            is_often = self.known[mine].sum(axis=0) >= max(MIN_SHARE * len(mine), MIN_TOGETHER)
+            is_often[track] = False
+            others = np.flatnonzero(is_often)
+            compared = mine[:: -(-len(mine) // MAX_COMPARED)]
+            theirs = self.smoothed[compared][:, others]
+            spreads = distances_from(self.positions[compared, track], theirs).spread
+            order = np.argsort(spreads, kind="stable")
+            self._steadiest[track] = others[order], spreads[order]
+        return self._steadiest[track]
+
+    @cached_property
+    def _steadiest(self) -> dict[int, tuple[NDArray[np.int64], NDArray[np.float64]]]:
+        return {}
+
     @cached_property
     def known(self) -> NDArray[np.bool_]:
         """True where each track was measured or smoothed, shape (T, K)."""
@@ -223,16 +244,9 @@ def _helpers(
     before, after = ends[ends < span.first], ends[ends > span.last]
     needed = np.concatenate([before[-NEAREST_ENDS:], span.frames, after[:NEAREST_ENDS]])
     mine = np.flatnonzero(dense.seen[:, k])
-    n_together = known[mine].sum(axis=0)
-    is_there = known[needed].all(axis=0)
-    is_there &= n_together >= max(MIN_SHARE * len(mine), MIN_TOGETHER)
-    is_there[k] = False
-    others = np.flatnonzero(is_there)
-    compared = mine[:: -(-len(mine) // MAX_COMPARED)]
-    theirs = dense.smoothed[compared][:, others]
-    spreads = distances_from(dense.positions[compared, k], theirs).spread
-    steadiest = np.argsort(spreads, kind="stable")[:MAX_HELPERS]
-    others, spreads = others[steadiest], spreads[steadiest]
+    candidates, spreads = dense.steadiest(k)
+    is_there = known[needed][:, candidates].all(axis=0)
+    others, spreads = candidates[is_there][:MAX_HELPERS], spreads[is_there][:MAX_HELPERS]
     # The number of helpers is limited so that most frames in which all are known remain.
     n_all = np.logical_and.accumulate(known[mine][:, others], axis=1).sum(axis=0)
     n = int((n_all >= MIN_SHARE * n_all.max(initial=0)).sum())

@@ -92,15 +92,14 @@ def learn_pattern(
     g = np.concatenate([g.sum(axis=0) - g, g.sum(axis=0)[None]])
     scale = max(np.trace(G[-1, :p, :p]) / p, 1e-12)  # a single helper is the centre of its body
     each = np.append(np.full(p, scale), 1e-9)
-    least, best, used = np.inf, g, RIDGES[-1]
-    for ridge in RIDGES:
-        B = np.linalg.solve(G + ridge * np.diag(each), g)
-        off = np.concatenate([a @ B[f] - c for f, (a, c) in enumerate(pieces)])
-        if (off**2).mean() < least:
-            least, best, used = float((off**2).mean()), B, ridge
-    found = A @ best + mean_y
+    ridges = np.array(RIDGES)[:, None, None, None] * np.diag(each)
+    B = np.linalg.solve(G + ridges, np.broadcast_to(g, (len(RIDGES), *g.shape)))
+    squares = sum(((a @ B[:, f] - c) ** 2).sum(axis=(1, 2)) for f, (a, c) in enumerate(pieces))
+    used = int(np.argmin(squares))
+    least = float(squares[used]) / b.size
+    found = A @ B[used] + mean_y
     # Frames within the length of a gap are correlated: together they count as one sample.
-    leverage = (A * np.linalg.solve(G[-1] + used * np.diag(each), A.T).T).sum(axis=1).clip(min=0)
+    leverage = (A * np.linalg.solve(G[-1] + ridges[used, 0], A.T).T).sum(axis=1).clip(min=0)
     return Pattern(
         by_fold=found[:-1], by_all=found[-1], fold=fold, variances=least * (1 + length * leverage)
     )

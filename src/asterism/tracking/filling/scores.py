@@ -130,17 +130,15 @@ def minimum_variance_weights(errors: NDArray[np.float64]) -> NDArray[np.float64]
     flat = flat[:, np.isfinite(flat[0])]
     C = flat @ flat.T / flat.shape[1]
     C += 1e-3 * np.diag(np.diag(C)) + TINY * np.eye(J)
-    best, least = np.eye(J)[int(np.argmin(np.diag(C)))], np.inf
-    for n in range(1, J + 1):
-        for chosen in map(list, itertools.combinations(range(J), n)):
-            scale = np.sqrt(np.diag(C)[chosen])  # errors can differ by a factor of millions
-            w = np.linalg.solve(C[np.ix_(chosen, chosen)] / np.outer(scale, scale), 1 / scale)
-            w /= scale
-            if (w >= 0).all() and 1 / w.sum() < least:
-                least = 1 / w.sum()
-                best = np.zeros(J)
-                best[chosen] = w / w.sum()
-    return best
+    scale = np.sqrt(np.diag(C))  # errors can differ by a factor of millions
+    chosen = np.array(list(itertools.product((0.0, 1.0), repeat=J))[1:])
+    # An estimator that is not chosen has a row and a column of its own.
+    both = chosen[:, :, None] * chosen[:, None, :]
+    own = C / np.outer(scale, scale) * both + np.eye(J) * (1 - chosen)[:, None]
+    w = np.linalg.solve(own, (chosen / scale)[..., None])[..., 0] / scale
+    precision = np.where((w >= 0).all(axis=1), w.sum(axis=1), 0)
+    best = int(np.argmax(precision))
+    return w[best] / precision[best]
 
 
 def error_profile(off: NDArray[np.float64]) -> NDArray[np.float64]:
