@@ -94,7 +94,8 @@ def learn_pattern(
     each = np.append(np.full(p, scale), 1e-9)
     ridges = np.array(RIDGES)[:, None, None, None] * np.diag(each)
     B = np.linalg.solve(G + ridges, np.broadcast_to(g, (len(RIDGES), *g.shape)))
-    squares = sum(((a @ B[:, f] - c) ** 2).sum(axis=(1, 2)) for f, (a, c) in enumerate(pieces))
+    missed = np.concatenate([a @ B[:, f] - c for f, (a, c) in enumerate(pieces)], axis=1)
+    squares = (missed**2).sum(axis=(1, 2))
     used = int(np.argmin(squares))
     least = float(squares[used]) / b.size
     found = A @ B[used] + mean_y
