@@ -3,8 +3,8 @@
 // All other detections stay on their tracks. In each frame the assignment with the largest sum of
 // gains is found exactly, given the labels of the other frames.
 //
-//   s_ik     log odds of open detection i being of track k instead of clutter: those of its distances
-//            to the other tracks of the frame, and of the motion between the frames around it
+//   s_ik     log odds of open detection i being of track k instead of clutter: those of its
+//            distances to the other tracks of the frame, and of the motion around the frame
 //   gain_ik  s_ik, with `change` in favour of what i has now, a track or none
 #pragma once
 
@@ -39,7 +39,8 @@ class FrameAssignment {
  public:
   FrameAssignment(const OpenFrames& all, DistanceProfiles& profiles, std::span<std::int64_t> labels)
       : all_(all), profiles_(profiles), labels_(labels), first_(all.sigma.size(), n_frames()),
-        last_(all.sigma.size(), -1), around_(all.sigma.size()), is_held_(all.sigma.size()), at_(profiles.n_references()) {}
+        last_(all.sigma.size(), -1), around_(all.sigma.size()), is_held_(all.sigma.size()),
+        at_(profiles.n_references()) {}
 
   void run() {
     for (std::int64_t t = 0; t < n_frames(); ++t)
@@ -57,9 +58,9 @@ class FrameAssignment {
   }
 
  private:
-  static constexpr double kDistances = 1.5;                     // weight of the mean of the distances
-  static constexpr double kMaxDistances = 4, kMaxMotion = 2;    // bounds of both kinds of evidence
-  static constexpr double kUnaccelerated = 9, kUnmoved = 100;   // growth of the variance of motion
+  static constexpr double kDistances = 1.5;  // weight of the mean of the distances
+  static constexpr double kMaxDistances = 4, kMaxMotion = 2;  // bounds of both kinds of evidence
+  static constexpr double kUnaccelerated = 9, kUnmoved = 100;  // growth of the variance of motion
 
   // The nearest two detections of a track before and after a frame, by frames from it.
   struct Around {
@@ -94,7 +95,8 @@ class FrameAssignment {
       if (is_held_[k]) continue;
       // Long before or after a track, another track may be of its marker.
       if (t < first_[k] - all_.max_gap || t > last_[k] + all_.max_gap) continue;
-      const auto distances = profiles_.support(k, all_.points[i], at_, static_cast<std::int32_t>(now));
+      const auto own = static_cast<std::int32_t>(now);
+      const auto distances = profiles_.support(k, all_.points[i], at_, own);
       const bool has_motion = around_[k].before[0] >= 0 || around_[k].after[0] >= 0;
       if (k != now && !distances && !has_motion) continue;
       double gain = kDistances * std::clamp(distances.value_or(0), -kMaxDistances, kMaxDistances);
@@ -108,8 +110,9 @@ class FrameAssignment {
   void look_around(std::int64_t t) {
     std::ranges::fill(around_, Around{});
     for (std::int64_t n = 1; n <= all_.max_gap; ++n) {
-      if (t - n >= 0) enter(t - n, static_cast<double>(n), &Around::before, &Around::n_before);
-      if (t + n < n_frames()) enter(t + n, static_cast<double>(n), &Around::after, &Around::n_after);
+      const auto far = static_cast<double>(n);
+      if (t - n >= 0) enter(t - n, far, &Around::before, &Around::n_before);
+      if (t + n < n_frames()) enter(t + n, far, &Around::after, &Around::n_after);
     }
   }
   void enter(std::int64_t t, double n, std::array<std::int64_t, 2> Around::* side,
@@ -124,8 +127,8 @@ class FrameAssignment {
       }
   }
 
-  // Log density of a detection between those of a track around it: Student's t around the polynomial
-  // through them, or around straight motion where they are on one side.
+  // Log density of a detection between those of a track around it: Student's t around the
+  // polynomial through them, or around straight motion where they are on one side.
   double motion(std::int64_t i, std::int32_t k) const {
     const Around& own = around_[k];
     std::array<std::int64_t, 4> points{};
@@ -139,7 +142,8 @@ class FrameAssignment {
     double variance = 0;
     if (own.before[0] >= 0 && own.after[0] >= 0) {
       const double half = (own.n_before[0] + own.n_after[0]) / 2;
-      variance = sigma2 * (1 + std::pow(half, 2.0 * static_cast<double>(std::min<std::size_t>(n, 3))) / 4);
+      const auto order = static_cast<double>(std::min<std::size_t>(n, 3));
+      variance = sigma2 * (1 + std::pow(half, 2 * order) / 4);
     } else {
       const double gap2 = when[0] * when[0];
       variance = sigma2 * (n == 2 ? 4 + kUnaccelerated * gap2 * gap2 : kUnmoved * gap2);

@@ -174,8 +174,8 @@ class Profiles {
   // Assigns the open detections of one frame after the other, and returns the track of each.
   Out<std::int64_t> assigned(const In<double>& points, const In<std::int64_t>& labels,
                              const In<std::int64_t>& offsets, const In<bool>& is_open,
-                             const In<double>& ghost, const In<double>& sigma, double log_clutter, double change,
-                             std::int64_t max_gap) {
+                             const In<double>& ghost, const In<double>& sigma, double log_clutter,
+                             double change, std::int64_t max_gap) {
     require(points.ndim() == 2 && points.shape(1) >= 1 && points.shape(1) <= kMaxAxes,
             "points: shape (N, D)");
     require_finite(points);
@@ -191,9 +191,9 @@ class Profiles {
     const std::vector<std::uint8_t> open(flat(is_open).begin(), flat(is_open).end());
     {
       nb::gil_scoped_release release;
-      FrameAssignment({at, flat(offsets), open, flat(ghost), flat(sigma), log_clutter, change, max_gap, D},
-                      *profiles_, own)
-          .run();
+      const OpenFrames all{at,          flat(offsets), open,    flat(ghost), flat(sigma),
+                           log_clutter, change,        max_gap, D};
+      FrameAssignment(all, *profiles_, own).run();
     }
     return array_of<std::int64_t>(own);
   }
