@@ -2,10 +2,14 @@
 
 The corrector goes through what the editor offers, the uncertain identities by falling number of
 expected wrong detections. Where one is wrong it states the marker, which is an action. Where none
-of them is wrong any more, it states the marker of the longest wrong stretch that is left. It has
-one action for three wrong links, and 420 at most. The same is done by hand, from the first frame
-on: each wrong link is mended by an exchange of both tracks from there on, a join, a cut, or a track
-for a stretch of detections without one. That is counted up to four times as many actions.
+of them is wrong any more, it states the marker of the longest wrong stretch that is left. Before
+the first action and after every five, it looks at what an assignment of all uncertain detections
+would change, and confirms that, an action too, if three in four of the changes are right. It has
+one action for three wrong links, and 420 at most.
+
+The same is done by hand, from the first frame on: each wrong link is mended by an exchange of both
+tracks from there on, a join, a cut, or a track for a stretch of detections without one. That is
+counted up to four times as many actions.
 
 Wrong links are those of the result between detections of different markers, and those of the truth
 that the result lacks (`am.evaluate`). Captures of ``../shared/data`` (or ``--data``), where the
@@ -68,6 +72,10 @@ def idf1(labels: NDArray[np.int64], truth: am.Tracks) -> float:
     return 2 * counts[rows, columns].sum() / n
 
 
+REASSIGN_AFTER = 5
+"""Number of actions after which the corrector looks at an assignment of all detections again."""
+RIGHT_FOR_A_WRONG = 3
+"""Number of right changes for each wrong one from which the corrector confirms the assignment."""
 NEAR = 25
 """Frames between detections of one stretch at most."""
 
@@ -82,7 +90,7 @@ class Corrector:
         self.stated: dict[int, int] = {}
         self.seen: set[int] = set()
         self.looked: set[tuple[int, int, int]] = set()
-        self.actions = self.looks = self.refused = 0
+        self.actions = self.looks = self.refused = self.next_reassign = 0
         self.seconds: list[float] = []
 
     @property
@@ -104,6 +112,8 @@ class Corrector:
     def run(self, limit: int) -> None:
         """Act until all is right, nothing is left to do, or the limit is reached."""
         while self.actions < limit and idf1(self.labels, self.truth) < ENOUGH:
+            if self.actions >= self.next_reassign and self.reassign():
+                continue
             if not (self.choose() or self.search()):
                 return
 
@@ -126,6 +136,22 @@ class Corrector:
                 of_marker = own[self.truth.labels[own] == marker]
                 return self.say(int(of_marker[len(of_marker) // 2]))
         return False
+
+    def reassign(self) -> bool:
+        """Look at an assignment of all uncertain detections, and confirm it where it helps."""
+        self.looks += 1
+        self.next_reassign = self.actions + REASSIGN_AFTER
+        wanted = np.append(self.mains(), -1)[self.truth.labels]
+        change = self.edit("reassign")
+        if change is None:
+            return False
+        n_right = int((change.after == wanted[change.detections]).sum())
+        n_wrong = len(change.detections) - n_right
+        if n_right < max(RIGHT_FOR_A_WRONG * n_wrong, LINKS_AN_ACTION):
+            self.correction.undo()
+            return False
+        self.actions += 1
+        return True
 
     def detections(self, each: Decision) -> NDArray[np.int64]:
         """Return the detections that a decision is about."""

@@ -17,6 +17,7 @@
 #include <functional>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -113,6 +114,26 @@ class DistanceProfiles {
     found.back() = unknown(part.track);
     return found;
   }
+
+  // Log density of the distances of one detection to others of its frame by the profile of a track,
+  // relative to an unknown marker, without those to its present track `own`. `at` is the point of
+  // each reference in the frame, null for none. Empty where too few steady distances are there.
+  std::optional<double> support(std::int32_t track, const Point& y,
+                                std::span<const Point* const> at, std::int32_t own) {
+    double sum = 0;
+    std::size_t n = 0;
+    for (const auto& [spread, r] : steadiest(track)) {
+      if (at[r] == nullptr || references_[r] == own) continue;
+      const double off = std::sqrt(squared_distance(y, *at[r], all_.D)) - distance(track, r).median;
+      sum += log_t(off, spread) - log_t(off, std::hypot(spread, kUnknownSpread));
+      if (++n == kNeighbours) break;
+    }
+    if (n < kMinNeighbours) return std::nullopt;
+    return sum / static_cast<double>(n);
+  }
+  std::size_t n_references() const { return references_.size(); }
+  // The number of a track among the references, -1 for none.
+  std::int32_t reference_of(std::int64_t track) const { return reference_of_[track]; }
 
  private:
   static constexpr std::size_t kReferences = 128;  // longest tracks, to which distances are taken
@@ -275,6 +296,17 @@ class DistanceProfiles {
     if (own.median == kLater) own = learn(track, r, true);
     return own.is_known() && own.spread < kSteady ? &own : nullptr;
   }
+  // The steady distances of a track, by rising spread.
+  const std::vector<std::pair<double, std::size_t>>& steadiest(std::int32_t track) {
+    steadiest_.resize(profiles_.size());
+    if (!steadiest_[track]) {
+      steadiest_[track].emplace();
+      for (std::size_t r = 0; r < references_.size(); ++r)
+        if (const Distance* own = steady(track, r)) steadiest_[track]->push_back({own->spread, r});
+      std::ranges::sort(*steadiest_[track]);
+    }
+    return *steadiest_[track];
+  }
   Distance& kept(std::int32_t track, std::size_t r) {
     std::vector<Distance>& profile = profiles_[track];
     if (profile.empty()) profile.assign(references_.size(), {kLater});
@@ -346,6 +378,7 @@ class DistanceProfiles {
   std::vector<std::size_t> begin_;  // of each track in `samples_`
   std::vector<std::int32_t> at_;  // point of each reference in the sampled frames, -1 for none
   std::vector<std::vector<Distance>> profiles_;  // of each track, empty until it is needed
+  std::vector<std::optional<std::vector<std::pair<double, std::size_t>>>> steadiest_;
   std::vector<double> of_samples_;
   // Of the part that is compared.
   std::size_t n_measured_ = 0;

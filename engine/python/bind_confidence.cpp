@@ -9,6 +9,7 @@
 #include "base/parallel.hpp"
 #include "confidence/distance_profiles.hpp"
 #include "confidence/exchanges.hpp"
+#include "confidence/frame_assignment.hpp"
 #include "python/arrays.hpp"
 #include "python/bindings.hpp"
 #include "python/motion_arrays.hpp"
@@ -170,6 +171,33 @@ class Profiles {
     return found.give({tracks.size(), n});
   }
 
+  // Assigns the open detections of one frame after the other, and returns the track of each.
+  Out<std::int64_t> assigned(const In<double>& points, const In<std::int64_t>& labels,
+                             const In<std::int64_t>& offsets, const In<bool>& is_open,
+                             const In<double>& ghost, const In<double>& sigma, double log_clutter,
+                             double change, std::int64_t max_gap) {
+    require(points.ndim() == 2 && points.shape(1) >= 1 && points.shape(1) <= kMaxAxes,
+            "points: shape (N, D)");
+    require_finite(points);
+    const std::size_t n = points.shape(0);
+    require(labels.size() == n && is_open.size() == n && ghost.size() == n,
+            "labels, is_open and ghost: one for each point");
+    require(static_cast<std::int64_t>(sigma.size()) == n_tracks_, "sigma: one for each track");
+    require_offsets(flat(offsets), n, "offsets: rising, within the points");
+    for (const std::int64_t k : flat(labels)) require(k >= -1 && k < n_tracks_, "labels: below K");
+    const auto D = static_cast<int>(points.shape(1));
+    const std::vector<Point> at = to_points(points, D);
+    std::vector<std::int64_t> own(flat(labels).begin(), flat(labels).end());
+    const std::vector<std::uint8_t> open(flat(is_open).begin(), flat(is_open).end());
+    {
+      nb::gil_scoped_release release;
+      const OpenFrames all{at,          flat(offsets), open,    flat(ghost), flat(sigma),
+                           log_clutter, change,        max_gap, D};
+      FrameAssignment(all, *profiles_, own).run();
+    }
+    return array_of<std::int64_t>(own);
+  }
+
  private:
   static constexpr std::size_t kBlock = 64;  // parts that a thread takes at a time
 
@@ -214,6 +242,8 @@ void bind_confidence(nb::module_& module) {
                     const In<std::int64_t>&, std::int64_t, double>(),
            "points"_a, "labels"_a, "offsets"_a, "samples"_a, nb::kw_only(), "n_tracks"_a, "noise"_a)
       .def("agreements", &Profiles::agreements, "pairs"_a)
+      .def("assigned", &Profiles::assigned, "points"_a, "labels"_a, "offsets"_a, "is_open"_a,
+           "ghost"_a, "sigma"_a, nb::kw_only(), "log_clutter"_a, "change"_a, "max_gap"_a)
       .def("compare", &Profiles::compare, "tracks"_a, "frames"_a, "offsets"_a, "partners"_a,
            nb::kw_only(), "n_threads"_a)
       .def("densities", &Profiles::densities, "tracks"_a, "frames"_a, "offsets"_a, "others"_a);

@@ -528,6 +528,20 @@ class DistanceProfiles:
     ) -> None: ...
     # Log density ratio of one marker against two, of pairs of tracks.
     def agreements(self, pairs: Ints) -> Floats: ...
+    # Track of each detection, the open ones of each frame assigned again.
+    def assigned(
+        self,
+        points: Floats,
+        labels: Ints,
+        offsets: Ints,
+        is_open: NDArray[np.bool_],
+        ghost: Floats,
+        sigma: Floats,
+        *,
+        log_clutter: float,
+        change: float,
+        max_gap: int,
+    ) -> Ints: ...
     # (whether distances are known, log densities of an unknown marker, other tracks, theirs)
     def compare(
         self, tracks: Ints, frames: Ints, offsets: Ints, partners: Ints, *, n_threads: int

@@ -351,3 +351,63 @@ def test_what_was_taken_along_from_clutter_can_be_refused(tmp_path):
     session.refuse(change, i)
     assert (session.tracks.labels[own[120:123]] == -1).all()
     assert (session.tracks.labels[own[[50, 80, 200]]] >= 0).all()
+
+
+def holes(truth, share, seed):
+    """Return tracks of which a share of the detections is clutter, and these detections."""
+    own = np.random.default_rng(seed).random(len(truth.labels)) < share
+    labels = np.where(own, -1, truth.labels)
+    return am.Tracks(detections=truth.detections, labels=labels, names=truth.names), own
+
+
+REASSIGN = Edit(kind="reassign", at=())
+
+
+def test_detections_without_a_track_are_assigned_again_all_at_once():
+    truth = am.simulate.person(activity="walk", frames=200, seed=3)
+    tracks, lost = holes(truth, 0.05, 3)
+    model = am.estimate_model(truth.detections).model
+    found = am.tracking.correct(tracks, [REASSIGN], model)
+    assert (found.labels[~lost] == truth.labels[~lost]).all()
+    is_right = found.labels[lost] == truth.labels[lost]
+    assert is_right.mean() > 0.97
+    assert set(found.labels[lost][~is_right].tolist()) <= {-1}
+
+
+def test_stated_clutter_and_stated_markers_stay_when_all_is_assigned_again():
+    truth = am.simulate.person(activity="walk", frames=200, seed=3)
+    tracks, lost = holes(truth, 0.05, 3)
+    d, model = truth.detections, am.estimate_model(truth.detections).model
+    ghost, wrong = (int(i) for i in np.flatnonzero(lost)[[20, 60]])
+    other = int(np.flatnonzero(tracks.labels == truth.labels[ghost])[0])
+    edits = [
+        Edit(kind="clutter", at=at(d, ghost)),
+        Edit(kind="same", at=at(d, other, wrong)),
+        REASSIGN,
+    ]
+    assert truth.labels[wrong] != truth.labels[other]
+    correction = am.tracking.Correction(tracks, model)
+    for edit in edits[:2]:
+        correction.apply(edit)
+    before = correction.tracks.labels.copy()
+    change = correction.apply(REASSIGN)
+    now = correction.tracks.labels
+    assert now[ghost] == -1
+    assert now[wrong] == now[other] == truth.labels[other]
+    assert len(change.detections) > 100
+    assert not any(each.is_asked for each in change.stretches)
+    assert correction.undo() is change
+    assert (correction.tracks.labels == before).all()
+
+
+def test_emptied_tracks_do_not_hinder_an_assignment_of_all():
+    truth = am.simulate.person(activity="walk", frames=100, seed=3)
+    last = truth.n_tracks - 1
+    tracks, lost = holes(truth, 0.05, 3)
+    labels = np.where(truth.labels == last, -1, tracks.labels)
+    tracks = am.Tracks(detections=truth.detections, labels=labels, names=truth.names)
+    model = am.estimate_model(truth.detections).model
+    found = am.tracking.correct(tracks, [REASSIGN], model)
+    again = lost & (truth.labels != last)
+    assert (found.labels[again] == truth.labels[again]).mean() > 0.9
+    assert (found.labels[truth.labels == last] == -1).all()

@@ -243,6 +243,32 @@ def test_a_point_of_clutter_is_joined_by_keyboard(browser, served):
     page.close()
 
 
+PREVIEW = "document.getElementById('filling').innerText"
+
+
+def test_an_assignment_of_all_points_is_previewed_and_confirmed(browser, served):
+    page = opened(browser, served)
+    page.key("t")
+    page.wait(f"{PREVIEW}.includes('would change')")
+    assert not (served.folder / "trial.edits.toml").exists()
+    n = int(page.run(PREVIEW).split("Assigned again, ")[1].split()[0])
+    page.key("Escape")
+    page.wait(f"{PREVIEW} === ''")
+    page.run("document.getElementById('edit-reassign').click()")
+    page.wait(f"{PREVIEW}.includes('would change')")
+    page.key("Enter")
+    on_disk(page, 1)
+    assert [each.kind for each in edits_of(served)] == ["reassign"]
+    session = session_of(served)
+    assert (session.tracks.labels != session.begun.tracks.labels).sum() == n
+    assert_same_tracks(page, session)
+    assert "Take back" in page.run("document.getElementById('changed').innerText")
+    page.key("r")
+    on_disk(page, 2)
+    assert_same_tracks(page, session_of(served))
+    page.close()
+
+
 def test_two_tabs_see_the_same(browser, served):
     one, other = opened(browser, served), opened(browser, served)
     one.key("2")

@@ -13,6 +13,7 @@ EDITS = (
     Edit(kind="same", at=((3, 0), (9, 2)), who="Ada", when="2026-11-25T09:00:00+00:00"),
     Edit(kind="name", at=((4, 1),), name='a "name" \\ with\nall'),
     Edit(kind="no_fill", at=((4, 1), (7, 1))),
+    Edit(kind="reassign", at=(), who="Ada"),
 )
 
 

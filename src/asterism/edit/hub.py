@@ -92,6 +92,8 @@ class Hub:
         """
         if action == "preview":
             return await self._preview(message)
+        if action == "preview_reassign":
+            return await self._preview_reassign()
         if action == "save":
             return await self._save()
         async with self._lock:
@@ -144,6 +146,8 @@ class Hub:
         if action == "edit":
             own = [view.detection(i) for i in message["detections"]]
             return session.edit(message["kind"], *own, name=message["name"])
+        if action == "reassign":
+            return session.edit("reassign")
         if action == "fill":
             return session.fill(*self._gap(message), message["kind"])
         at = self._assessment_of - message["assessment"]
@@ -178,6 +182,12 @@ class Hub:
             "track": track, "first": first + self.view.shift, "last": last + self.view.shift,
             "points": np.round(points, 5).tolist(), "sigma": np.round(sigma, 6).tolist(),
         }  # fmt: skip
+
+    async def _preview_reassign(self) -> dict[str, Any]:
+        async with self._lock:
+            edit = self.session.edit("reassign")
+            change = await asyncio.to_thread(self.session.preview, edit)
+        return {"stretches": self.view.stretches(change)}
 
     async def _save(self) -> dict[str, Any]:
         async with self._lock:

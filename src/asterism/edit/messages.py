@@ -16,6 +16,8 @@ _FIELDS: dict[str, dict[str, str]] = {
     "edit": {"kind": _TEXT, "detections": _NUMBERS, "name": _TEXT},
     "fill": {"kind": _TEXT, "track": _NUMBER, "first": _NUMBER, "last": _NUMBER},
     "preview": {"track": _NUMBER, "first": _NUMBER, "last": _NUMBER},
+    "preview_reassign": {},
+    "reassign": {},
     "choose": {"assessment": _NUMBER, "decision": _NUMBER, "alternative": _CHOICE},
     "refuse": {"version": _NUMBER, "stretch": _NUMBER},
     "undo": {},
@@ -24,7 +26,7 @@ _FIELDS: dict[str, dict[str, str]] = {
 }
 _FILLS = ("fill", "no_fill")
 _KINDS = {
-    "edit": tuple(kind for kind in get_args(EditKind) if kind not in _FILLS),
+    "edit": tuple(kind for kind in get_args(EditKind) if kind not in (*_FILLS, "reassign")),
     "fill": _FILLS,
 }
 _MAX_TEXT = 200

@@ -174,6 +174,23 @@ class Session:
         self._undone.clear()
         return change
 
+    def preview(self, edit: Edit) -> Change:
+        """Return what an edit would change; the tracks and the file stay as they are.
+
+        Parameters
+        ----------
+        edit : Edit
+            Edit that is not made.
+
+        Raises
+        ------
+        ParameterError
+            If it contradicts earlier edits.
+        """
+        change = self._correction.apply(edit)
+        self._correction.undo()
+        return change
+
     def undo(self) -> Change | None:
         """Take back the last edit, and return what it had changed; None without one."""
         edits = self.edits

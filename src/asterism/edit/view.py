@@ -104,19 +104,21 @@ class View:
                 for k, name in enumerate(names)
                 if k >= len(before) or name != before[k]
             },
-            "stretches": [
-                {
-                    **dataclasses.asdict(stretch),
-                    "at": self.shown_frame(stretch.first),
-                    "end": self.shown_frame(stretch.last),
-                    "first": stretch.first + self.shift,
-                    "last": stretch.last + self.shift,
-                }
-                for stretch in change.stretches
-            ]
-            if is_new
-            else [],
+            "stretches": self.stretches(change) if is_new else [],
         }
+
+    def stretches(self, change: Change) -> list[dict[str, Any]]:
+        """Return the stretches of a change as plain values."""
+        return [
+            {
+                **dataclasses.asdict(stretch),
+                "at": self.shown_frame(stretch.first),
+                "end": self.shown_frame(stretch.last),
+                "first": stretch.first + self.shift,
+                "last": stretch.last + self.shift,
+            }
+            for stretch in change.stretches
+        ]
 
     def edit(self, edit: Edit) -> dict[str, Any]:
         """Return an edit as plain values, with the frame numbers of the capture."""

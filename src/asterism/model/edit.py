@@ -10,23 +10,25 @@ from asterism.records import record
 
 __all__ = ["Edit", "EditKind"]
 
-EditKind = Literal["same", "different", "cut", "clutter", "name", "fill", "no_fill"]
+EditKind = Literal["same", "different", "cut", "clutter", "name", "fill", "no_fill", "reassign"]
 
-N_DETECTIONS = {"clutter": 1, "name": 1}
+N_DETECTIONS = {"clutter": 1, "name": 1, "reassign": 0}
 """Number of detections of an edit, where it is not two."""
 
 
 @record
 class Edit:
-    """Statement of a person about one or two detections, which the tracks must respect.
+    """Statement of a person about detections, which the tracks must respect.
 
     Parameters
     ----------
-    kind : {"same", "different", "cut", "clutter", "name", "fill", "no_fill"}
+    kind : {"same", "different", "cut", "clutter", "name", "fill", "no_fill", "reassign"}
         ``same``: both detections are of one marker. ``different``: they are not. ``cut``: they
         follow each other in a track and are not of one marker, and the track is parted exactly
         there. ``clutter``: the detection is a false alarm. ``name``: it is of the marker `name`.
         ``fill``, ``no_fill``: the gap between both detections is filled, or is left open.
+        ``reassign``: about no detection; all uncertain ones are assigned once more, given the
+        tracks as the earlier edits have corrected them.
     at : tuple of (int, int)
         Frame of each detection, counted from 0, and its number among the points of that frame.
     name : str
@@ -63,7 +65,7 @@ class Edit:
         n = N_DETECTIONS.get(self.kind, 2)
         at = tuple((frame, point) for frame, point in self.at)
         if len(at) != n:
-            expected = f"{n} detection{'s' * (n > 1)} for {self.kind!r}"
+            expected = f"{n} detection{'s' * (n != 1)} for {self.kind!r}"
             raise ParameterError("at", expected, f"{len(at)}")
         for number in (number for each in at for number in each):
             check_number("at", number, above=0, closed=True, integer=True)
@@ -77,4 +79,4 @@ class Edit:
     def __repr__(self) -> str:
         places = ", ".join(f"frame {frame} point {point}" for frame, point in self.at)
         name = f" {clipped(self.name, 80)}" if self.name else ""
-        return f"Edit({self.kind}{name}: {places})"
+        return f"Edit({self.kind}{name}{': ' * bool(places)}{places})"

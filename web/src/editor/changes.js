@@ -6,6 +6,7 @@ const MAX_LISTED = 5;
 const WORDS = {
   same: "one marker", different: "different markers", cut: "cut", clutter: "ghost",
   name: "name", fill: "filled", no_fill: "left open",
+  reassign: "assigned again",
 };
 
 export class Changes {
@@ -17,29 +18,35 @@ export class Changes {
   /** Show the stretches of a change. */
   show(change) {
     this.latest = change;
-    const name = (k) => (k < 0 ? "clutter" : named(this.capture.header.names[k]));
-    const line = (stretch) => [
-      name(stretch.source), " → ", name(stretch.target),
-      `, ${frames(stretch.first, stretch.last)}, ${counted(stretch.n_detections, "point")}`,
-    ];
     const asked = change.stretches.filter((each) => each.is_asked);
     const also = change.stretches.filter((each) => !each.is_asked);
-    const rest = (list) => (list.length > MAX_LISTED ? [make("li", {}, `and ${list.length - MAX_LISTED} more`)] : []);
     const parts = [];
     if (!change.is_new) parts.push(make("p", {}, `Undone: ${WORDS[change.edit.kind]}.`));
     else if (!change.stretches.length) parts.push(make("p", {}, `Confirmed: ${WORDS[change.edit.kind]}${change.edit.name && ` ${change.edit.name}`}.`));
     if (asked.length) {
-      parts.push(make("ul", {}, ...asked.slice(0, MAX_LISTED).map((each) => make("li", {}, ...line(each))), ...rest(asked)));
+      parts.push(this.listed(asked));
     }
     if (also.length) {
       const items = also.slice(0, MAX_LISTED).map((each) => {
         const button = make("button", { type: "button" }, "Take back", each === also[0] ? make("kbd", { textContent: "R" }) : "");
         button.addEventListener("click", () => this.take(each));
-        return make("li", {}, ...line(each), " ", button);
+        return make("li", {}, ...this.line(each), " ", button);
       });
       parts.push(make("p", {}, "Also changed with it:"), make("ul", {}, ...items, ...rest(also)));
     }
     byId("changed").replaceChildren(...parts);
+  }
+
+  /** The tracks before and after, the frames and the size of a stretch. */
+  line({ source, target, first, last, n_detections }) {
+    const name = (k) => (k < 0 ? "clutter" : named(this.capture.header.names[k]));
+    return [name(source), " → ", name(target), `, ${frames(first, last)}, ${counted(n_detections, "point")}`];
+  }
+
+  /** A list of stretches. */
+  listed(stretches) {
+    const items = stretches.slice(0, MAX_LISTED).map((each) => make("li", {}, ...this.line(each)));
+    return make("ul", {}, ...items, ...rest(stretches));
   }
 
   clear() {
@@ -61,4 +68,8 @@ export class Changes {
     });
     byId("edit-list").replaceChildren(...items.reverse().slice(0, 200));
   }
+}
+
+function rest(list) {
+  return list.length > MAX_LISTED ? [make("li", {}, `and ${list.length - MAX_LISTED} more`)] : [];
 }

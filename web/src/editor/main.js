@@ -63,6 +63,7 @@ class Editor {
       ghost: () => this.correct(() => corrections.ghost()),
       fill: () => this.preview(),
       keep: () => selection.keep(),
+      reassign: () => this.previewAgain(),
       lasso: () => this.overlay?.lasso(!this.overlay.isOn),
       undo: () => this.send("undo"),
       redo: () => this.send("redo"),
@@ -72,14 +73,14 @@ class Editor {
     for (const [name, does] of Object.entries(act)) byId(`edit-${name}`).addEventListener("click", does);
     Object.assign(keys, {
       n: () => decisions.step(1), p: () => decisions.step(-1),
-      x: act.swap, j: act.join, v: act["cut-whole"], k: act.ghost, g: act.fill, e: act.keep,
+      x: act.swap, j: act.join, v: act["cut-whole"], k: act.ghost, g: act.fill, e: act.keep, t: act.reassign,
       c: (event) => (event.shiftKey ? act["cut-back"] : act.cut)(),
       o: act.lasso, u: () => selection.stepPoint(), i: () => this.naming.begin(),
       z: (event) => (event.shiftKey ? act.redo : act.undo)(), y: act.redo, b: act.save,
       r: () => this.attempt(() => this.changes.take()), "?": act.keys,
     });
     for (let n = 1; n <= 9; n++) keys[n] = () => decisions.choose(n);
-    keys.Enter = () => this.filling && this.fill("fill");
+    keys.Enter = () => this.confirm?.();
     const escape = keys.Escape;
     keys.Escape = (event) => {
       this.preview(null);
@@ -193,7 +194,7 @@ class Editor {
   /** Show how the gap of the selected track would be filled; null for nothing. */
   async preview(gap) {
     if (gap === null) {
-      this.filling = null;
+      this.filling = this.confirm = null;
       if (this.overlay) this.overlay.fill = null;
       byId("filling").replaceChildren();
       return;
@@ -207,18 +208,36 @@ class Editor {
     const answer = await this.send("preview", found);
     if (!answer) return;
     this.filling = found;
+    this.confirm = () => this.fill("fill");
     if (this.overlay) this.overlay.fill = answer;
     const worst = 1000 * Math.max(...answer.sigma);
-    const button = (text, key, kind) => {
-      const made = make("button", { type: "button" }, text, key && make("kbd", { textContent: key }));
-      made.addEventListener("click", () => this.fill(kind));
-      return made;
-    };
     byId("filling").replaceChildren(
       make("p", {}, `Gap, ${frames(answer.first, answer.last)}: standard deviation up to ${worst.toPrecision(2)} mm. The band is two of them.`),
-      make("div", { className: "tools" }, button("Fill", "Enter", "fill"), button("Leave open", "", "no_fill")),
+      make("div", { className: "tools" }, button("Fill", "Enter", this.confirm), button("Leave open", "", () => this.fill("no_fill"))),
     );
     this.stage?.redraw();
+  }
+
+  /** Show what an assignment of all uncertain points, given what was stated, would change. */
+  async previewAgain() {
+    this.preview(null);
+    const answer = await this.send("preview_reassign");
+    if (!answer) return;
+    const { stretches } = answer;
+    if (!stretches.length) {
+      byId("filling").replaceChildren(make("p", {}, "Assigned again, no point would change."));
+      return;
+    }
+    const n = stretches.reduce((sum, each) => sum + each.n_detections, 0);
+    this.confirm = () => {
+      this.preview(null);
+      this.send("reassign");
+    };
+    byId("filling").replaceChildren(
+      make("p", {}, `Assigned again, ${counted(n, "point")} would change:`),
+      this.changes.listed([...stretches].sort((a, b) => b.n_detections - a.n_detections)),
+      make("div", { className: "tools" }, button("Confirm", "Enter", this.confirm), button("Dismiss", "Esc", () => this.preview(null))),
+    );
   }
 
   fill(kind) {
@@ -235,7 +254,7 @@ class Editor {
   }
 
   withoutServer() {
-    for (const name of ["fill", "redo"]) byId(`edit-${name}`).hidden = true;
+    for (const name of ["fill", "redo", "reassign"]) byId(`edit-${name}`).hidden = true;
     byId("edit-save").firstChild.textContent = "Download edits";
     byId("decision").hidden = true;
     byId("uncertain-tile").hidden = true;
@@ -263,4 +282,10 @@ class Editor {
     byId("edit-undo").disabled = !n;
     byId("edit-redo").disabled = !this.n_undone;
   }
+}
+
+function button(text, key, act) {
+  const made = make("button", { type: "button" }, text, key && make("kbd", { textContent: key }));
+  made.addEventListener("click", act);
+  return made;
 }

@@ -32,13 +32,14 @@ _KEYS = {
     "I": "give a name; Enter confirms, Esc leaves the field",
     "K": "delete the selected part: it is a ghost",
     "G": "preview the fill of the gap at this frame",
-    "Enter": "fill the gap of the preview",
+    "Enter": "confirm the preview",
+    "T": "preview an assignment of all uncertain points, given what was stated",
     "Z, Y": "undo, redo",
     "R": "take back the first of the other changes",
     "B": "save",
     "?": "list of keys",
 }
-_SERVED = ("1 … 9", "G", "Enter", "Z, Y", "R", "B")
+_SERVED = ("1 … 9", "G", "Enter", "T", "Z, Y", "R", "B")
 
 
 def editing_of(detections: Detections, file: str) -> Editing:
@@ -124,6 +125,7 @@ PANEL = element(
             _button("edit-cut-back", "Cut to here", "⇧C", "Cut the track up to this frame"),
             _button("edit-cut-whole", "Cut out", "V", "Cut out the part without gaps"),
             _button("edit-fill", "Fill gap", "G", "Preview the fill of the gap at this frame"),
+            _button("edit-reassign", "Assign again", "T", "Preview an assignment of all points"),
             _button("edit-keep", "Add", "E", "Keep the track and select a second one"),
             _button("edit-lasso", "Lasso", "O", "Draw around markers to select them"),
             class_="tools",
@@ -139,7 +141,7 @@ PANEL = element(
             element("button", "Give", type="submit", id="edit-give"),
             id="edit-naming",
         ),
-        element("div", id="filling", role="group", aria_label="Fill of a gap"),
+        element("div", id="filling", role="group", aria_label="Preview"),
         role="group",
         aria_label="Corrections",
     ),

@@ -109,7 +109,7 @@ class Motion:
         self.max_gap = model.population.max_gap + 1
         self._model = model
         corners = [f(axis=0, initial=s) for f, s in ((y.max, -np.inf), (y.min, np.inf))]
-        self._log_volume = float(np.log(np.maximum(corners[0] - corners[1], MIN_EXTENT)).sum())
+        self.log_volume = float(np.log(np.maximum(corners[0] - corners[1], MIN_EXTENT)).sum())
 
     def ratios(self, lanes: tuple[Lane, Lane], cuts: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the log-likelihood ratios of exchanges of both tails, by the filter of the model.
@@ -190,7 +190,7 @@ class Motion:
         ndarray of shape (m,)
         """
         y, frame = self._d.points, self._frame
-        log_clutter = np.log(clutter) - self._log_volume
+        log_clutter = np.log(clutter) - self.log_volume
         padded = np.concatenate([[-1, -1], own, [-1, -1]])
         at = np.searchsorted(frame[own], frame[others]) + 2
         best = np.full(len(others), -np.inf)

@@ -7,16 +7,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from asterism.model import Tracks
+from asterism.tracking.confidence.identity import assess
 from asterism.tracking.correction.constraints import Constraints, detections_of
 from asterism.tracking.correction.evidence import Evidence
 from asterism.tracking.correction.exchange import Lane, Motion, best_exchange
+from asterism.tracking.correction.reassign import reassigned
+from asterism.tracking.correction.settled import settled
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from asterism.model import Edit, TrackingModel, Tracks
+    from asterism.model import Edit, TrackingModel
     from asterism.tracking.stitching import Stitching
 
 __all__ = ["NoSolution", "Solver"]
@@ -33,6 +37,8 @@ PROBABLE = float(np.log(4))
 """Log odds from which a detection without a track is brought to one that an edit is about."""
 IDLE = 50
 """Frames along a track after which no more detections without a track are looked for."""
+UNCERTAIN = 0.8
+"""Confidence of an identity below which a detection is assigned again."""
 MIN_FIT = -40.0
 """Smallest log likelihood, relative to straight motion, of a detection that continues another. It
 is far below that of a link of the tracker, which misses markers that accelerate."""
@@ -63,7 +69,7 @@ class Solver:
     def __init__(
         self, tracks: Tracks, model: TrackingModel, stitching: Stitching | None = None
     ) -> None:
-        self._d = tracks.detections
+        self._d, self._model, self._stitching = tracks.detections, model, stitching
         self.evidence = Evidence(tracks, model, stitching)
         self._motion = Motion(self._d, model)
         self.labels = tracks.labels.copy()
@@ -95,6 +101,8 @@ class Solver:
             self._drop(own[0])
         elif edit.kind == "name":
             self._call(own[0], edit.name)
+        elif edit.kind == "reassign":
+            self._reassign()
         if edit.kind in ("same", "name"):
             self._collect(int(self.labels[own[0]]))
 
@@ -336,6 +344,20 @@ class Solver:
         others = others[np.argsort(-odds, kind="stable")][: int((odds > PROBABLE).sum())]
         _, first = np.unique(frame[others], return_index=True)  # the most probable of each frame
         labels[others[first]] = track
+
+    def _reassign(self) -> None:
+        """Assign the uncertain detections and those without a track once more."""
+        tracks = Tracks(detections=self._d, labels=self.labels, names=tuple(self.names))
+        assessed = settled(
+            assess(tracks, self._model, self._stitching), self._constraints.edits
+        ).identity_confidence
+        assert assessed is not None
+        is_open = (self.labels >= 0) & (assessed < UNCERTAIN)
+        is_open[list(self._constraints.pinned)] = False
+        self.labels = reassigned(
+            tracks, is_open | self._free(), self.evidence.ghost,
+            self._model.sensor.noise_sigma, self._motion.log_volume, PROBABLE,
+        )  # fmt: skip
 
     def _free(self) -> NDArray[np.bool_]:
         """Return which detections have no track, without those that an edit is about.

@@ -1,0 +1,93 @@
+"""Assignment of all uncertain detections once more, given the tracks as they are corrected."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.tracking.rigidity.profiles import learn_profiles
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from asterism.model import Tracks
+
+__all__ = ["reassigned"]
+
+ROUNDS = 3
+"""Largest number of times that all frames are assigned, each with the distances learnt anew."""
+REACH = 8
+"""Number of frames before and after a detection by which its motion is predicted."""
+
+
+def reassigned(
+    tracks: Tracks,
+    is_open: NDArray[np.bool_],
+    ghost: NDArray[np.float64],
+    noise_sigma: float,
+    log_volume: float,
+    change: float,
+) -> NDArray[np.int64]:
+    """Assign the open detections to the tracks, frame by frame; all others stay.
+
+    Each frame has the assignment with the largest sum of log odds, given the labels of the others.
+    The log odds are those of the distances to the other tracks in the frame, against an unknown
+    marker, and of smooth motion between the frames around it, against clutter.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks as they are corrected.
+    is_open : ndarray of bool, shape (N,)
+        Detections that may go to another track, or become clutter.
+    ghost : ndarray of shape (N,)
+        Log odds of each detection without a track being a ghost.
+    noise_sigma : float
+        Standard deviation of a coordinate, metres.
+    log_volume : float
+        Logarithm of the volume in which clutter is spread.
+    change : float
+        Log odds that a change must gain.
+
+    Returns
+    -------
+    ndarray of int, shape (N,)
+        Track of each detection, -1 for clutter.
+    """
+    d, labels = tracks.detections, tracks.labels.astype(np.int64)
+    points, offsets = np.ascontiguousarray(d.points), d.offsets.astype(np.int64)
+    log_clutter = float(np.log(max((labels < 0).sum(), 1) / d.n_frames)) - log_volume
+    sigma = _roughness(tracks) + noise_sigma
+    for _ in range(ROUNDS):
+        engine = learn_profiles(d, labels, noise_sigma).engine
+        found = engine.assigned(
+            points, labels, offsets, is_open, ghost, sigma[: labels.max(initial=-1) + 1],
+            log_clutter=log_clutter, change=change, max_gap=REACH,
+        )  # fmt: skip
+        if np.array_equal(found, labels):
+            break
+        labels = found
+    return labels
+
+
+def _roughness(tracks: Tracks) -> NDArray[np.float64]:
+    """Return the median deviation of each track from a cubic through four neighbours, (K,).
+
+    A track without five successive frames has that of all tracks.
+    """
+    order, _ = tracks.by_track
+    d = tracks.detections
+    track, y = tracks.labels[order], d.points[order]
+    n = max(len(order) - 4, 0)
+    frame = d.frame_of[order].astype(np.int64)
+    is_run = (track[4:] == track[:n]) & (frame[4:] - frame[:n] == 4)
+    off = y[2 : n + 2] - (4 * (y[1 : n + 1] + y[3 : n + 3]) - y[:n] - y[4:]) / 6
+    off = np.sqrt((off[is_run] ** 2).mean(axis=1))
+    own = track[:n][is_run]
+    found = np.full(tracks.n_tracks, np.median(off) if len(off) else 0.0)
+    by = np.argsort(own, kind="stable")
+    for part in np.split(by, np.flatnonzero(np.diff(own[by])) + 1):
+        if len(part):
+            found[own[part[0]]] = np.median(off[part])
+    return found
