@@ -16,6 +16,7 @@ from asterism.records import record
 from asterism.tracking.confidence import assess
 from asterism.tracking.confidence.identity import OTHER_JOIN
 from asterism.tracking.estimation import fit_body_motion
+from asterism.tracking.lone import with_lone_detections
 from asterism.tracking.methods import METHODS, TOMHT, Rigidity, method_by_name, options_of
 from asterism.tracking.methods.associate import associate
 from asterism.tracking.naming import learn_marker_set, name_tracks
@@ -170,8 +171,8 @@ def most_certain(
     third is by `TOMHT` with `Rigidity` and the motion of `fit_body_motion`. It must be more certain
     by `DOUBTFUL`, because it uses distances as the confidence does. `refined_by_own_distances`
     follows, and after the third attempt further passes (`next_pass`), until one is not more
-    certain. For `progress`, the first method is half of the work, and every other attempt or pass
-    half of what is left.
+    certain. At the end the tracks take lone detections. For `progress`, the first method is half of
+    the work, and every other attempt or pass half of what is left.
 
     Parameters
     ----------
@@ -209,7 +210,7 @@ def most_certain(
         best = again
     if progress is not None:
         progress(n)
-    return _with_reason(best, first)
+    return _with_lone_detections(_with_reason(best, first))
 
 
 def _has_bonds(recipe: Recipe) -> bool:
@@ -226,6 +227,14 @@ def _by(
 def _more_certain(before: Uncorrected, other: Uncorrected, margin: float) -> Uncorrected:
     """Return the other result if it is more certain by a number of detections."""
     return other if other.expected_right > before.expected_right + margin else before
+
+
+def _with_lone_detections(found: Uncorrected) -> Uncorrected:
+    if found.stitching is None:
+        return found
+    stitching = with_lone_detections(found.stitching, found.model)
+    tracks = dataclasses.replace(stitching.tracks, recipe=found.tracks.recipe)
+    return dataclasses.replace(found, tracks=tracks, stitching=stitching)
 
 
 def _with_reason(best: Uncorrected, first: Uncorrected) -> Uncorrected:
