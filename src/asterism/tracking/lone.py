@@ -74,8 +74,8 @@ def with_lone_detections(found: Stitching, model: TrackingModel) -> Stitching:
     log_odds = _log_odds(((d.points[lone] - middle[gap]) ** 2).sum(axis=1), scale2, d.n_axes, model)
     order = np.argsort(-log_odds, kind="stable")
     order = order[log_odds[order] > math.log(CERTAIN / (1 - CERTAIN))]
-    best = [np.unique(each[order], return_index=True)[1] for each in (gap, lone)]
-    taken = order[np.intersect1d(*best)]
+    first_of_gap, first_of_lone = (np.unique(of[order], return_index=True)[1] for of in (gap, lone))
+    taken = order[np.intersect1d(first_of_gap, first_of_lone)]
     before, lone = own[gaps[gap[taken]]], lone[taken]
     labels, tracklets = tracks.labels.copy(), found.tracklets.copy()
     labels[lone], tracklets[lone] = labels[before], tracklets[before]
