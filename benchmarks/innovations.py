@@ -2,10 +2,10 @@
 
 The true tracks of captures as recorded, and with every second frame. Each detection is predicted
 from the detections of its marker in earlier frames, by the estimated model and by that of
-`fit_body_motion`. With bonds, the prediction of the latter is combined with the position that
-bonded neighbours in the same frame predict (`RigidCarrier`), where that has the smaller variance.
-The NIS is the squared error of an axis over its predicted variance, 1 in the mean if calibrated. A
-marker is predicted from its second detection after a gap on.
+`fit_body_motion`. With bonds, the prediction by the latter is combined, like a measurement, with
+the position that the six steadiest bonded neighbours predict by their motion since the frame
+before; at least three are needed. The NIS is the squared error of an axis over its predicted
+variance, 1 in the mean if calibrated. A marker is predicted from its third detection in a row on.
 
     python benchmarks/innovations.py [--data FOLDER] [--only NAME] [--markdown FILE]
 """
@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,6 +28,8 @@ from report import conditions, publish, table
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+MIN_TOGETHER, MAX_DEVIATION, MIN_NEIGHBOURS, MAX_NEIGHBOURS = 20, 0.1, 3, 6
+"""A bond: frames together, and deviation as a share of the distance. Neighbours that predict."""
 WAYS = ("own motion", "own motion, of bodies", "with bonds")
 
 
@@ -80,10 +82,30 @@ class Filters:
         self.weight[markers] = weight / weight.sum(axis=1, keepdims=True)
 
 
+def with_bonds(
+    bonds: tuple[NDArray[Any], ...], k: int, before: NDArray[np.float64],
+    now: NDArray[np.float64], own: tuple[NDArray[np.float64], float], r: float,
+) -> tuple[NDArray[np.float64], float]:  # fmt: skip
+    """Combine the prediction of marker k with that of its bonded neighbours: position, variance."""
+    others, n, mean, _, variance = bonds
+    is_bond = (n >= MIN_TOGETHER) & (variance <= (MAX_DEVIATION * mean) ** 2)
+    is_bond &= np.isfinite(before[others] + now[others]).all(axis=1)
+    used = np.flatnonzero(is_bond)
+    used = used[np.argsort(variance[used], kind="stable")][:MAX_NEIGHBOURS]
+    if len(used) < MIN_NEIGHBOURS:
+        return own
+    ids = others[used]
+    then = before[[k]]
+    place, v, _ = _engine.carried(before[ids], now[ids], 1 / variance[used], then, r, then)
+    place = place[: now.shape[1]]
+    share = own[1] / (own[1] + v)
+    return own[0] + share * (place - own[0]), share * v
+
+
 def innovations(
-    at: NDArray[np.float64], model: am.TrackingModel, step: float, has_bonds: bool
-) -> list[NDArray[np.float64]]:
-    """Return (error, NIS of an axis) of each prediction: by own motion, and with bonds if asked for.
+    at: NDArray[np.float64], model: am.TrackingModel, step: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return error and NIS of an axis of each prediction, (n, 2): by own motion, and with bonds.
 
     Parameters
     ----------
@@ -93,39 +115,31 @@ def innovations(
         Model of motion and noise.
     step : float
         Time between two frames, seconds.
-    has_bonds : bool
-        Whether markers are predicted with bonds too.
     """
     _, n, n_axes = at.shape
     filters = Filters(model, n, n_axes, step)
-    carrier = _engine.RigidCarrier(n_axes=n_axes, noise_sigma=model.sensor.noise_sigma)
+    neighbours = _engine.Neighbours(n_axes, filters.r)
     age = np.zeros(n, dtype=np.int64)  # frames in a row in which the marker was detected
-    found: list[list[tuple[float, float]]] = [[] for _ in range(1 + has_bonds)]
+    before = at[0]
+    found: list[list[tuple[float, float]]] = [[], []]
     for y in at:
-        own, variance = filters.predict()
+        places, variances = filters.predict()
         is_seen = np.isfinite(y).all(axis=1)
-        seen = np.flatnonzero(is_seen)
         for k in np.flatnonzero(is_seen & (age >= 2)):
-            predictions = [(own[k], variance[k])]
-            if has_bonds:
-                others = seen[seen != k]
-                carried = carrier.carry(int(k), others, np.ascontiguousarray(y[others]))
-                if carried is not None and carried[1] < variance[k]:
-                    share = variance[k] / (variance[k] + carried[1])
-                    both = own[k] + share * (np.array(carried[0]) - own[k])
-                    predictions.append((both, share * carried[1]))
-                else:
-                    predictions.append(predictions[0])
-            for each, (place, v) in zip(found, predictions, strict=True):
-                error2 = ((y[k] - place) ** 2).sum()
-                each.append((np.sqrt(error2), error2 / n_axes / (v + filters.r)))
+            own = places[k], float(variances[k])
+            bonds = neighbours.of(int(k))
+            both = with_bonds(bonds, int(k), before, y, own, filters.r)
+            for each, (place, v) in zip(found, (own, both), strict=True):
+                error2 = float(((y[k] - place) ** 2).sum())
+                each.append((error2**0.5, error2 / n_axes / (v + filters.r)))
         new = np.flatnonzero(is_seen & (age == 0))
         filters.begin(new, y[new])
         old = np.flatnonzero(is_seen & (age > 0))
         filters.update(old, y[old])
-        carrier.see(seen, np.ascontiguousarray(y[seen]))
-        age = np.where(is_seen, age + 1, 0)
-    return [np.array(each) for each in found]
+        seen = np.flatnonzero(is_seen)
+        neighbours.add(seen, np.ascontiguousarray(y[seen]))
+        age, before = np.where(is_seen, age + 1, 0), y
+    return np.array(found[0]), np.array(found[1])
 
 
 def main() -> None:
@@ -146,9 +160,9 @@ def main() -> None:
             model = am.estimate_model(d).model
             fitted = fit_body_motion(d, model)
             at, step = truth.positions(), d.step or 1.0
-            found = innovations(at, model, step, has_bonds=False)
+            found = [innovations(at, model, step)[0]]
             if fitted is not None:
-                found += innovations(at, fitted[0], step, has_bonds=True)
+                found += innovations(at, fitted[0], step)
             row = [path.name, rate]
             for each in found:
                 size = 1e3 * np.quantile(each[:, 0], [0.5, 0.99])
