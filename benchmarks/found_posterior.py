@@ -70,7 +70,7 @@ def main() -> None:
             rows.append(
                 [name, rate, found.recipe.label, f"{am.evaluate(found, truth).idf1:.3f}",
                  f"{int((off >= -NEAR).sum())} of {len(off)}",
-                 f"{np.median(off):.0f}", f"{off.min():.0f}"]
+                 str(round(np.median(off))), str(round(off.min()))]
             )  # fmt: skip
             print(*rows[-1], sep=" | ", flush=True)
     head = ["capture", "rate", "method", "IDF1", "pieces ≥ truth − 1 nat",
