@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import pytest
 
 import asterism as am
-from asterism.tracking.estimation import fit_body_motion
+from asterism.tracking.estimation import fit_body_motion, fit_to_tracks
 from asterism.tracking.estimation.fitted_motion import MotionFit
 from asterism.tracking.estimation.motion_fit import FitBounds, fit_motion
 
@@ -34,3 +35,12 @@ def test_random_walks_have_no_such_motion():
     )
     d = walkers.detections
     assert fit_body_motion(d, am.estimate_model(d).model) is None
+
+
+def test_the_noise_of_tracks_is_found_from_a_model_that_has_more():
+    walk = am.simulate.person(activity="walk", frames=200, seed=3)
+    truth = am.simulate.corrupt(walk, noise=5e-4, seed=3)
+    model = am.estimate_model(truth.detections).model
+    sensor = dataclasses.replace(model.sensor, noise_sigma=4 * model.sensor.noise_sigma)
+    fitted = fit_to_tracks(truth, dataclasses.replace(model, sensor=sensor))
+    assert abs(fitted.sensor.noise_sigma - 5e-4) < 5e-5

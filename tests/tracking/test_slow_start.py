@@ -69,8 +69,8 @@ def test_tracks_of_the_slow_start_alone_are_left_out():
 
 
 def test_a_further_pass_mends_fast_motion_and_is_repeated_by_its_recipe():
-    run = am.simulate.person(activity="run", frames=400, seed=12)
-    truth = am.simulate.corrupt(run, missing=0.1, clutter=0.1, noise=3e-4, stride=4, seed=12)
+    walk = am.simulate.person(activity="walk", frames=600, seed=21)
+    truth = am.simulate.corrupt(walk, missing=0.1, clutter=0.1, noise=3e-4, stride=6, seed=21)
     d = truth.detections
     recipe = plan_tracking(d, stitch=True).recipe
     method = am.TOMHT(rigid=am.tracking.Rigidity())

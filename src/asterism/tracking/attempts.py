@@ -15,8 +15,9 @@ import numpy as np
 from asterism.records import record
 from asterism.tracking.confidence import assess
 from asterism.tracking.confidence.identity import OTHER_JOIN
-from asterism.tracking.estimation import fit_body_motion
-from asterism.tracking.methods import METHODS, TOMHT, Rigidity, method_by_name, options_of
+from asterism.tracking.estimation import OVER_THREE_FRAMES, fit_body_motion, fit_to_tracks
+from asterism.tracking.lone import with_lone_detections
+from asterism.tracking.methods import GNN, METHODS, TOMHT, Rigidity, method_by_name, options_of
 from asterism.tracking.methods.associate import associate
 from asterism.tracking.naming import learn_marker_set, name_tracks
 from asterism.tracking.slow_start import after_slow_start, with_slow_start
@@ -125,7 +126,9 @@ def attempt(
 
 
 def next_pass(found: Uncorrected, progress: Callable[[int], Any] | None = None) -> Uncorrected:
-    """Associate a capture once more by the same method, which first learns bonds from the tracks.
+    """Associate a capture once more by the same method, with bonds and motion of the tracks so far.
+
+    The method first learns the bonds in a slow start; noise and motion are fitted to the tracks.
 
     Parameters
     ----------
@@ -136,6 +139,7 @@ def next_pass(found: Uncorrected, progress: Callable[[int], Any] | None = None) 
     """
     recipe = dataclasses.replace(found.recipe, passes=found.recipe.passes + 1)
     made = method_by_name(recipe.method, **recipe.options)
+    model = fit_to_tracks(found.tracks, found.model)
     slow_start, n = with_slow_start(found.tracks), found.tracks.detections.n_frames
 
     def advance(done: int) -> None:
@@ -143,10 +147,10 @@ def next_pass(found: Uncorrected, progress: Callable[[int], Any] | None = None) 
             progress(done * n // slow_start.n_frames)
 
     slow = associate(
-        made, slow_start, found.model, seed=recipe.seed, recipe=recipe, score=False,
+        made, slow_start, model, seed=recipe.seed, recipe=recipe, score=False,
         progress=advance,
     )  # fmt: skip
-    return _stitched(after_slow_start(slow, found.tracks.detections), recipe, found.model)
+    return _stitched(after_slow_start(slow, found.tracks.detections), recipe, model)
 
 
 def _stitched(tracks: Tracks, recipe: Recipe, model: TrackingModel) -> Uncorrected:
@@ -166,50 +170,63 @@ def most_certain(
 ) -> Uncorrected:
     """Make attempts while identities are uncertain, and return the most certain result.
 
-    The first is by the method of the recipe, the second by `TOMHT`, unless the first has bonds. The
-    third is by `TOMHT` with `Rigidity` and the motion of `fit_body_motion`. It must be more certain
-    by `DOUBTFUL`, because it uses distances as the confidence does. `refined_by_own_distances`
-    follows, and after the third attempt further passes (`next_pass`), until one is not more
-    certain. For `progress`, the first method is half of the work, and every other attempt or pass
-    half of what is left.
+    The first is by the method of the recipe. The others are by `TOMHT`: with `Rigidity` and the
+    motion of `fit_body_motion`, and without, unless bonds are better or the first has some. That
+    with bonds must be more certain by `DOUBTFUL`, because it uses distances as the confidence does.
+    Then further passes follow (`next_pass`), until one is not more certain, and an attempt with the
+    motion in tracks of single frames. Every result is `refined_by_own_distances`. At the end the
+    tracks take lone detections. For `progress`, the first method is half of the work, and every
+    other attempt or pass half of what is left.
 
     Parameters
     ----------
     recipe, detections, method, start, progress
         As for `carry_out`.
     """
-    n = detections.n_frames
+    n, n_made = detections.n_frames, -1
 
-    def half_of_rest(n_before: int) -> Callable[[int], None]:
-        """Return the progress of an attempt after so many others."""
+    def half_of_rest() -> Callable[[int], None]:
+        """Return the progress of the next attempt."""
+        nonlocal n_made
+        n_made += 1
+        whole = 2 ** (n_made + 1)
 
         def advance(done: int) -> None:
             if progress is not None:
-                whole = 2 ** (n_before + 1)
                 progress(((whole - 2) * n + done) // whole)
 
         return advance
 
-    first = attempt(recipe, detections, method, start=start, progress=half_of_rest(0))
+    first = attempt(recipe, detections, method, start=start, progress=half_of_rest())
     best = first
     # A recipe by `TOMHT`, or with several passes, is that of a further attempt already.
     if best.is_doubtful and recipe.method != TOMHT.name and recipe.passes == 1:
-        if not _has_bonds(recipe):
-            best = _more_certain(best, _by(TOMHT(), recipe, detections, half_of_rest(1)), 0)
-        if best.is_doubtful and (fitted := fit_body_motion(detections, recipe.model)) is not None:
-            bodies, method = dataclasses.replace(recipe, model=fitted[0]), TOMHT(rigid=Rigidity())
-            other = _by(method, bodies, detections, half_of_rest(2))
-            best = _more_certain(best, other, DOUBTFUL * detections.n_points)
-    best = refined_by_own_distances(best)
+        bodies = _by_bonds(recipe, detections, OVER_THREE_FRAMES, half_of_rest())
+        if bodies is not None:
+            best = _more_certain(first, bodies, DOUBTFUL * detections.n_points)
+        if best is first and not _has_bonds(recipe):
+            best = _more_certain(first, _by(TOMHT(), recipe, detections, half_of_rest()), 0)
+        has_bodies = best is bodies
+        best = _after_passes(refined_by_own_distances(best), half_of_rest)
+        if has_bodies and best.is_doubtful:
+            bodies = _by_bonds(recipe, detections, GNN(rigid=Rigidity()), half_of_rest())
+            assert bodies is not None
+            best = _more_certain(best, refined_by_own_distances(bodies), 0)
+    else:
+        best = refined_by_own_distances(first)
+    if progress is not None:
+        progress(n)
+    return _with_lone_detections(_with_reason(best, first))
+
+
+def _after_passes(best: Uncorrected, begin: Callable[[], Callable[[int], Any]]) -> Uncorrected:
+    """Pass over the capture again with bonds, while that makes more identities certain."""
     while best.is_doubtful and best.recipe.passes < MAX_PASSES and _has_bonds(best.recipe):
-        again = next_pass(best, half_of_rest(2 + best.recipe.passes))
-        again = _more_certain(best, refined_by_own_distances(again), 0)
+        again = _more_certain(best, refined_by_own_distances(next_pass(best, begin())), 0)
         if again is best:
             break
         best = again
-    if progress is not None:
-        progress(n)
-    return _with_reason(best, first)
+    return best
 
 
 def _has_bonds(recipe: Recipe) -> bool:
@@ -223,9 +240,28 @@ def _by(
     return attempt(recipe, detections, method, progress=progress)
 
 
+def _by_bonds(
+    recipe: Recipe, detections: Detections, method: Method[Any], progress: Callable[[int], Any]
+) -> Uncorrected | None:
+    """Track by `TOMHT` with bonds and the motion in tracks of a method; None for random walks."""
+    fitted = fit_body_motion(detections, recipe.model, method)
+    if fitted is None:
+        return None
+    bodies = dataclasses.replace(recipe, model=fitted[0])
+    return _by(TOMHT(rigid=Rigidity()), bodies, detections, progress)
+
+
 def _more_certain(before: Uncorrected, other: Uncorrected, margin: float) -> Uncorrected:
     """Return the other result if it is more certain by a number of detections."""
     return other if other.expected_right > before.expected_right + margin else before
+
+
+def _with_lone_detections(found: Uncorrected) -> Uncorrected:
+    if found.stitching is None:
+        return found
+    stitching = with_lone_detections(found.stitching, found.model)
+    tracks = dataclasses.replace(stitching.tracks, recipe=found.tracks.recipe)
+    return dataclasses.replace(found, tracks=tracks, stitching=stitching)
 
 
 def _with_reason(best: Uncorrected, first: Uncorrected) -> Uncorrected:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from asterism.model import DWNA, InteractingMotions
 from asterism.tracking.estimation.estimate import MIN_NOISE, WIDER
@@ -16,23 +16,27 @@ from asterism.tracking.methods.smp import SMP
 
 if TYPE_CHECKING:
     from asterism.model import Detections, TrackingModel, Tracks
+    from asterism.tracking.methods.base import Method
 
-__all__ = ["fit_body_motion"]
+__all__ = ["OVER_THREE_FRAMES", "fit_body_motion", "fit_to_tracks"]
 
 BETWEEN = 10.0
 """Ratio of the strongest to the weakest motion at the start, where a model has one motion."""
+BOUNDS = FitBounds(min_noise=MIN_NOISE, max_acceleration=math.inf)
+OVER_THREE_FRAMES = SMP(window=3, rigid=Rigidity())
+"""Method by whose tracks the motion is fitted by default."""
 
 
 def fit_body_motion(
-    detections: Detections, model: TrackingModel
+    detections: Detections, model: TrackingModel, method: Method[Any] = OVER_THREE_FRAMES
 ) -> tuple[TrackingModel, Tracks] | None:
-    """Fit noise and motion of a model to tracks of markers on bodies, by `SMP` with `Rigidity`.
+    """Fit noise and motion of a model to tracks of markers on bodies, by a method with `Rigidity`.
 
     `estimate_model` admits no acceleration by which a marker could reach its neighbour, because it
     could not tell it from a wrong link, and explains faster motion as noise. Bonds between markers
-    tell them apart, so that there is no such bound here. `SMP` considers three frames: in tracks of
-    single frames so many links of fast markers are wrong that the fitted motion grows with each
-    fit.
+    tell them apart, so that there is no such bound here. In tracks of single frames so many links
+    of fast markers are wrong that the fitted motion grows with each fit, so that `SMP` over three
+    frames is the default.
 
     Parameters
     ----------
@@ -40,6 +44,8 @@ def fit_body_motion(
         Capture.
     model : TrackingModel
         Estimated model.
+    method : Method
+        Method with bonds.
 
     Returns
     -------
@@ -60,20 +66,45 @@ def fit_body_motion(
     >>> len(fitted.motion.models), tracks.n_tracks
     (3, 53)
     """
-    fit = _start(model)
-    if fit is None:
+    start = _start(model)
+    if start is None:
         return None
-    levels = (*fit.levels[:-1], WIDER * fit.levels[-1])
     n_axes = detections.n_axes
-    wide = _with(model, dataclasses.replace(fit, noise=MIN_NOISE, levels=levels), n_axes)
-    bounds = FitBounds(min_noise=MIN_NOISE, max_acceleration=math.inf)
-    method = SMP(window=3, rigid=Rigidity())
+    levels = (*start.levels[:-1], WIDER * start.levels[-1])
+    wide = _with(model, dataclasses.replace(start, noise=MIN_NOISE, levels=levels), n_axes)
     rough = associate(method, detections, wide, score=False)
-    fit = fit_motion(rough, wide, fit, bounds, refine=True)
-    fitted = _with(model, fit, n_axes)
-    tracks = associate(method, detections, fitted, score=False)
-    fit = fit_motion(tracks, fitted, fit, bounds, refine=True)
-    return _with(model, fit, n_axes), tracks
+    fit = fit_motion(rough, model, start, BOUNDS, refine=True)
+    tracks = associate(method, detections, _with(model, fit, n_axes), score=False)
+    return _with(model, fit_motion(tracks, model, fit, BOUNDS, refine=True), n_axes), tracks
+
+
+def fit_to_tracks(tracks: Tracks, model: TrackingModel) -> TrackingModel:
+    """Fit noise and motion of a model to tracks whose links are right for the most part.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks of a capture.
+    model : TrackingModel
+        Model with one DWNA or three, from which the search starts.
+
+    Returns
+    -------
+    TrackingModel
+        Model with three motions.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.person(frames=100, seed=1)
+    >>> model = am.estimate_model(truth.detections).model
+    >>> len(fit_to_tracks(truth, model).motion.models)
+    3
+    """
+    start = _start(model)
+    assert start is not None
+    fit = fit_motion(tracks, model, start, BOUNDS, refine=True)
+    return _with(model, fit, tracks.detections.n_axes)
 
 
 def _start(model: TrackingModel) -> MotionFit | None:
