@@ -4,7 +4,8 @@
 // gains is found exactly, given the labels of the other frames.
 //
 //   s_ik     log odds of open detection i being of track k instead of clutter: those of its
-//            distances to the other tracks of the frame, and of the motion around the frame
+//            distances to the other tracks of the frame, and of the motion around the frame;
+//            where it has no distances, a detection stays where it is
 //   gain_ik  s_ik, with `change` in favour of what i has now, a track or none
 #pragma once
 
@@ -97,11 +98,13 @@ class FrameAssignment {
       if (t < first_[k] - all_.max_gap || t > last_[k] + all_.max_gap) continue;
       const auto own = static_cast<std::int32_t>(now);
       const auto distances = profiles_.support(k, all_.points[i], at_, own);
-      const bool has_motion = around_[k].before[0] >= 0 || around_[k].after[0] >= 0;
-      if (k != now && !distances && !has_motion) continue;
-      double gain = kDistances * std::clamp(distances.value_or(0), -kMaxDistances, kMaxDistances);
-      if (has_motion) gain += std::clamp(motion(i, k) - all_.log_clutter, -kMaxMotion, kMaxMotion);
-      if (k == now) gain += all_.change;
+      if (k != now && !distances) continue;
+      double gain = k == now ? all_.change : 0;
+      if (distances) {
+        gain += kDistances * std::clamp(*distances, -kMaxDistances, kMaxDistances);
+        if (around_[k].before[0] >= 0 || around_[k].after[0] >= 0)
+          gain += std::clamp(motion(i, k) - all_.log_clutter, -kMaxMotion, kMaxMotion);
+      }
       if (now < 0) gain -= all_.change + all_.ghost[i];
       if (gain > 0) candidates_.push_back({row, k, gain});
     }

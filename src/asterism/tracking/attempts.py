@@ -15,6 +15,7 @@ import numpy as np
 from asterism.records import record
 from asterism.tracking.confidence import assess
 from asterism.tracking.confidence.identity import OTHER_JOIN
+from asterism.tracking.confidence.reassign import UNCERTAIN, ghost_log_odds, reassigned
 from asterism.tracking.estimation import OVER_THREE_FRAMES, fit_body_motion, fit_to_tracks
 from asterism.tracking.lone import with_lone_detections
 from asterism.tracking.methods import GNN, METHODS, TOMHT, Rigidity, method_by_name, options_of
@@ -26,6 +27,8 @@ from asterism.tracking.stitching.exchanged import with_markers
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from numpy.typing import NDArray
 
     from asterism.model import Detections, Recipe, TrackingModel, Tracks
     from asterism.tracking.methods import Method
@@ -175,8 +178,9 @@ def most_certain(
     with bonds must be more certain by `DOUBTFUL`, because it uses distances as the confidence does.
     Then further passes follow (`next_pass`), until one is not more certain, and an attempt with the
     motion in tracks of single frames. Every result is `refined_by_own_distances`. At the end the
-    tracks take lone detections. For `progress`, the first method is half of the work, and every
-    other attempt or pass half of what is left.
+    uncertain detections of tracks with bonds are assigned once more, and tracks take lone
+    detections. For `progress`, the first method is half of the work, and every other attempt or
+    pass half of what is left.
 
     Parameters
     ----------
@@ -216,7 +220,7 @@ def most_certain(
         best = refined_by_own_distances(first)
     if progress is not None:
         progress(n)
-    return _with_lone_detections(_with_reason(best, first))
+    return _with_lone_detections(_reassigned(_with_reason(best, first)))
 
 
 def _after_passes(best: Uncorrected, begin: Callable[[], Callable[[int], Any]]) -> Uncorrected:
@@ -279,6 +283,29 @@ def _with_reason(best: Uncorrected, first: Uncorrected) -> Uncorrected:
     return dataclasses.replace(best, tracks=tracks, recipe=recipe)
 
 
+def _reassigned(found: Uncorrected) -> Uncorrected:
+    """Assign uncertain detections once more, while that makes more identities certain.
+
+    Distances decide, so that bonds must have made the tracks. The confidence uses the same ones: it
+    is too high for the result to be compared with another attempt.
+    """
+    best = found
+    for _ in range(MAX_ROUNDS):
+        if not best.is_doubtful or not _has_bonds(best.recipe):
+            break
+        tracks, identity = best.assessed, best.assessed.identity_confidence
+        assert identity is not None
+        labels = reassigned(
+            tracks, identity < UNCERTAIN, ghost_log_odds(tracks, best.stitching),
+            best.model.sensor.noise_sigma,
+        )  # fmt: skip
+        again = _with_labels(best, labels, int(tracks.info.get("refinements", 0)) + 1)
+        if again.expected_right <= best.expected_right:
+            break
+        best = again
+    return best
+
+
 def refined_by_own_distances(found: Uncorrected) -> Uncorrected:
     """Name tracks by marker sets learnt from them, while that makes more identities certain.
 
@@ -300,23 +327,20 @@ def refined_by_own_distances(found: Uncorrected) -> Uncorrected:
         if not best.is_doubtful:
             break
         named = name_tracks(named, learn_marker_set(named)).tracks
-        refined = _renamed(found, named, n)
-        if refined.expected_right <= best.expected_right:
+        renamed = _with_labels(found, named.labels, n)
+        if renamed.expected_right <= best.expected_right:
             break
-        best = refined
+        best = renamed
     return best
 
 
-def _renamed(found: Uncorrected, named: Tracks, n: int) -> Uncorrected:
-    """Return a result with the labels of named tracks; the parts that moved are joins there."""
+def _with_labels(found: Uncorrected, labels: NDArray[np.int64], n: int) -> Uncorrected:
+    """Return a result with other labels; the parts that moved are joins there."""
     info, stitching = {**found.tracks.info, "refinements": n}, found.stitching
     if stitching is not None:
-        certainty = np.full(len(named.labels), OTHER_JOIN)
-        stitching = with_markers(stitching, named.labels, certainty)
+        stitching = with_markers(stitching, labels, np.full(len(labels), OTHER_JOIN))
         info["joins"] = len(stitching.joins)
-    tracks = dataclasses.replace(
-        found.tracks, labels=named.labels, names=(None,) * named.n_tracks, info=info
-    )
+    tracks = dataclasses.replace(found.tracks, labels=labels, names=(), info=info)
     if stitching is not None:
         stitching = dataclasses.replace(stitching, tracks=tracks)
     return dataclasses.replace(found, tracks=tracks, stitching=stitching)

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.tracking.confidence.calibration import MARGINS, PART, log_odds
+from asterism.tracking.confidence.calibration import MARGINS, PART
 from asterism.tracking.confidence.identity import examine
 from asterism.tracking.confidence.parts import PART_FRAMES
+from asterism.tracking.confidence.reassign import ghost_log_odds
 from asterism.tracking.rigidity.profiles import candidate_margins, learn_profiles
 
 if TYPE_CHECKING:
@@ -48,14 +49,12 @@ class Evidence:
         self.before = parts.before
         n = len(parts.track)
         self.part_of = np.full(len(tracks.labels), -1)
-        self.ghost = np.zeros(len(tracks.labels))
+        self.ghost = ghost_log_odds(tracks, stitching)
         self.part_of[tracks.by_track[0]] = np.repeat(np.arange(n), parts.n_detections)
         if stitching is not None:  # ghosts are parts too, which a person can take back
             is_ghost = (tracks.labels < 0) & (stitching.tracklets >= 0)
             _, numbers = np.unique(stitching.tracklets[is_ghost], return_inverse=True)
             self.part_of[is_ghost] = n + numbers
-            of = stitching.tracklets[is_ghost]
-            self.ghost[is_ghost] = log_odds(stitching.probabilities[of])
 
     def gains(
         self,

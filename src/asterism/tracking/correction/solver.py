@@ -9,10 +9,10 @@ import numpy as np
 
 from asterism.model import Tracks
 from asterism.tracking.confidence.identity import assess
+from asterism.tracking.confidence.reassign import PROBABLE, UNCERTAIN, reassigned
 from asterism.tracking.correction.constraints import Constraints, detections_of
 from asterism.tracking.correction.evidence import Evidence
 from asterism.tracking.correction.exchange import Lane, Motion, best_exchange
-from asterism.tracking.correction.reassign import reassigned
 from asterism.tracking.correction.settled import settled
 
 if TYPE_CHECKING:
@@ -33,12 +33,8 @@ TRACKED = 3.0
 """Log odds of a detection that continues a track being of its marker instead of clutter."""
 MAX_SHARED = 0.02
 """Largest share of the frames of a track that a track of the same marker may have too."""
-PROBABLE = float(np.log(4))
-"""Log odds from which a detection without a track is brought to one that an edit is about."""
 IDLE = 50
 """Frames along a track after which no more detections without a track are looked for."""
-UNCERTAIN = 0.8
-"""Confidence of an identity below which a detection is assigned again."""
 MIN_FIT = -40.0
 """Smallest log likelihood, relative to straight motion, of a detection that continues another. It
 is far below that of a link of the tracker, which misses markers that accelerate."""
@@ -355,9 +351,8 @@ class Solver:
         is_open = (self.labels >= 0) & (assessed < UNCERTAIN)
         is_open[list(self._constraints.pinned)] = False
         self.labels = reassigned(
-            tracks, is_open | self._free(), self.evidence.ghost,
-            self._model.sensor.noise_sigma, self._motion.log_volume, PROBABLE,
-        )  # fmt: skip
+            tracks, is_open | self._free(), self.evidence.ghost, self._model.sensor.noise_sigma
+        )
 
     def _free(self) -> NDArray[np.bool_]:
         """Return which detections have no track, without those that an edit is about.

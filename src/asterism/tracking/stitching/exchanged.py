@@ -113,7 +113,8 @@ def with_markers(found: P, labels: NDArray[np.int64], probabilities: NDArray[np.
     found : Pass or Stitching
         Tracklets with their markers.
     labels : ndarray of int, shape (N,)
-        Marker of each detection from now on; without one are the same detections as before.
+        Marker of each detection from now on, -1 for none. One without a tracklet that has a marker
+        becomes a tracklet, and one that loses its marker leaves its tracklet.
     probabilities : ndarray of shape (N,)
         Probability that each detection changed its marker rightly, NaN for those that did not.
 
@@ -124,7 +125,9 @@ def with_markers(found: P, labels: NDArray[np.int64], probabilities: NDArray[np.
     """
     # A tracklet ends where its marker changes, and where another tracklet is on its marker.
     # Tracklets are numbered by their start, as before.
-    inside = np.flatnonzero(found.tracklets >= 0)
+    found = _with_tracklets_of(found, np.flatnonzero((found.tracklets < 0) & (labels >= 0)))
+    has_marker = np.append(found.markers, -1)[found.tracklets] >= 0
+    inside = np.flatnonzero((found.tracklets >= 0) & ((labels >= 0) | ~has_marker))
     of, marker = found.tracklets[inside].astype(np.int64), labels[inside]
     marker = np.where(marker >= 0, marker, labels.max() + 1 + of)  # each ghost is alone
     is_start = _changes(of, marker) | _changes(marker, of)
@@ -136,7 +139,7 @@ def with_markers(found: P, labels: NDArray[np.int64], probabilities: NDArray[np.
     tracklets[order] = number[part]
     starts = np.sort(first)
     old = found.tracklets[starts]
-    markers = np.where(found.markers[old] < 0, found.markers[old], labels[starts]).astype(np.int32)
+    markers = np.where(labels[starts] >= 0, labels[starts], found.markers[old]).astype(np.int32)
     after = np.full(len(starts), -1, dtype=np.int32)
     chain = np.lexsort((np.arange(len(starts)), markers))
     follows = (np.diff(markers[chain]) == 0) & (markers[chain[1:]] >= 0)
@@ -152,6 +155,22 @@ def with_markers(found: P, labels: NDArray[np.int64], probabilities: NDArray[np.
     # Two that did not change are joined over a part that left: by some change.
     kept[new] = np.where(np.isnan(least), np.nanmin(probabilities), least)
     return replace(found, tracklets=tracklets, markers=markers, after=after, probabilities=kept)
+
+
+def _with_tracklets_of(found: P, detections: NDArray[np.int64]) -> P:
+    """Make a tracklet of each of some detections that have none."""
+    if not len(detections):
+        return found
+    tracklets, n = found.tracklets.copy(), len(found.markers)
+    tracklets[detections] = n + np.arange(len(detections))
+    none = np.full(len(detections), -1, dtype=np.int32)
+    return replace(
+        found,
+        tracklets=tracklets,
+        markers=np.append(found.markers, none),
+        after=np.append(found.after, none),
+        probabilities=np.append(found.probabilities, np.ones(len(detections))),
+    )
 
 
 def _changes(key: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -1,4 +1,4 @@
-"""Assignment of all uncertain detections once more, given the tracks as they are corrected."""
+"""Assignment of the uncertain detections once more, given the distances that tracks keep."""
 
 from __future__ import annotations
 
@@ -6,15 +6,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from asterism.tracking.confidence.calibration import log_odds
+from asterism.tracking.estimation.evidence import Region
 from asterism.tracking.rigidity.profiles import learn_profiles
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from asterism.model import Tracks
+    from asterism.tracking.stitching import Stitching
 
-__all__ = ["reassigned"]
+__all__ = ["PROBABLE", "UNCERTAIN", "ghost_log_odds", "reassigned"]
 
+UNCERTAIN = 0.8
+"""Confidence of an identity below which a detection is assigned again."""
+PROBABLE = float(np.log(4))
+"""Log odds that a change must gain."""
 ROUNDS = 3
 """Largest number of times that all frames are assigned, each with the distances learnt anew."""
 REACH = 8
@@ -26,29 +33,24 @@ def reassigned(
     is_open: NDArray[np.bool_],
     ghost: NDArray[np.float64],
     noise_sigma: float,
-    log_volume: float,
-    change: float,
 ) -> NDArray[np.int64]:
     """Assign the open detections to the tracks, frame by frame; all others stay.
 
     Each frame has the assignment with the largest sum of log odds, given the labels of the others.
     The log odds are those of the distances to the other tracks in the frame, against an unknown
-    marker, and of smooth motion between the frames around it, against clutter.
+    marker, and of smooth motion between the frames around it, against clutter. A detection goes to
+    a track only by distances: one of independent markers stays where it is.
 
     Parameters
     ----------
     tracks : Tracks
-        Tracks as they are corrected.
+        Tracks of a capture.
     is_open : ndarray of bool, shape (N,)
         Detections that may go to another track, or become clutter.
     ghost : ndarray of shape (N,)
-        Log odds of each detection without a track being a ghost.
+        Log odds of each detection without a track being a ghost, as of `ghost_log_odds`.
     noise_sigma : float
         Standard deviation of a coordinate, metres.
-    log_volume : float
-        Logarithm of the volume in which clutter is spread.
-    change : float
-        Log odds that a change must gain.
 
     Returns
     -------
@@ -57,18 +59,36 @@ def reassigned(
     """
     d, labels = tracks.detections, tracks.labels.astype(np.int64)
     points, offsets = np.ascontiguousarray(d.points), d.offsets.astype(np.int64)
-    log_clutter = float(np.log(max((labels < 0).sum(), 1) / d.n_frames)) - log_volume
+    n_clutter = max(int((labels < 0).sum()), 1)
+    log_clutter = float(np.log(n_clutter / (d.n_frames * Region.of(d).volume)))
     sigma = _roughness(tracks) + noise_sigma
     for _ in range(ROUNDS):
         engine = learn_profiles(d, labels, noise_sigma).engine
         found = engine.assigned(
             points, labels, offsets, is_open, ghost, sigma[: labels.max(initial=-1) + 1],
-            log_clutter=log_clutter, change=change, max_gap=REACH,
+            log_clutter=log_clutter, change=PROBABLE, max_gap=REACH,
         )  # fmt: skip
         if np.array_equal(found, labels):
             break
         labels = found
     return labels
+
+
+def ghost_log_odds(tracks: Tracks, stitching: Stitching | None) -> NDArray[np.float64]:
+    """Return the log odds of the tracklet of each detection being a ghost, 0 for others, (N,).
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks of a capture.
+    stitching : Stitching, optional
+        Stitching that made the tracks of the same detections.
+    """
+    found = np.zeros(len(tracks.labels))
+    if stitching is not None:
+        is_ghost = (tracks.labels < 0) & (stitching.tracklets >= 0)
+        found[is_ghost] = log_odds(stitching.probabilities[stitching.tracklets[is_ghost]])
+    return found
 
 
 def _roughness(tracks: Tracks) -> NDArray[np.float64]:
