@@ -210,6 +210,22 @@ def test_a_tracklet_ends_where_a_part_of_another_fills_its_gap():
     assert after.probabilities.tolist() == [1.0, 1.0, 0.8, 0.8, 0.8, 0.6]
 
 
+def test_detections_take_and_lose_a_marker_of_their_own():
+    """Clutter and a ghost are taken by a track, and a detection of another leaves it."""
+    found = Pass(
+        tracklets=np.array([0, 1, -1, 1, 0, 1, 2, 0], dtype=np.int32),
+        markers=np.array([0, 1, -2], dtype=np.int32),
+        after=np.full(3, -1, dtype=np.int32),
+        probabilities=np.array([1.0, 1.0, 0.6]),
+    )
+    labels = np.array([0, 1, 0, -1, 0, 1, 1, 0])
+    after = with_markers(found, labels, np.full(8, 0.95))
+    assert after.tracklets.tolist() == [0, 1, 2, -1, 3, 1, 4, 3]
+    assert after.markers.tolist() == [0, 1, 0, 0, 1]
+    assert after.after.tolist() == [-1, -1, 0, 2, 1]
+    assert after.probabilities[2:].tolist() == [0.95, 0.95, 0.95]
+
+
 @pytest.mark.parametrize(
     "changes",
     [
