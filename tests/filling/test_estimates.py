@@ -269,3 +269,11 @@ def test_points_filled_before_are_no_measurements():
     )
     np.testing.assert_array_equal(starts[0].labels, starts[1].labels)
     assert am.estimate_model(d).model == am.estimate_model(truth.detections).model
+
+
+def test_the_ridge_is_the_one_with_the_smallest_error():
+    rng = np.random.default_rng(3)
+    Z = rng.normal(size=(90, 5))
+    y = Z @ rng.normal(size=(5, 3))
+    found = learn_pattern(Z, y, np.ones(90, dtype=bool), 10)
+    np.testing.assert_allclose(found.by_all, y, atol=1e-4)  # the strongest one misses by 0.01
