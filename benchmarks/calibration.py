@@ -102,7 +102,6 @@ CORRUPTED: dict[str, Corrupt] = {
     "10 %/10 %, third of the rate": lambda truth, seed: missing(truth, seed, 3),
     "bursts": lambda truth, seed: bursts(truth, seed, 1),
     "bursts, half rate": lambda truth, seed: bursts(truth, seed, 2),
-    VISITS: visits,
 }
 
 
@@ -158,7 +157,7 @@ def simulated(seeds: int) -> Iterator[tuple[str, am.Tracks]]:
         range(FIRST_SEED, FIRST_SEED + seeds), SCENES.items()
     ):
         truth = make(seed) if seed % 2 else loosened(make(seed), seed)
-        for name, corrupt in CORRUPTED.items():
+        for name, corrupt in {**CORRUPTED, VISITS: visits}.items():
             yield f"{scene}, seed {seed}, {name}", corrupt(truth, seed)
 
 
