@@ -92,8 +92,9 @@ def oracle_idf1(truth: am.Tracks, max_gap: int) -> float:
     return am.evaluate(am.metrics.oracle_tracks(truth, max_gap), truth).idf1
 
 
-def options_of_the_run() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__)
+def options_of_the_run(description: str | None) -> argparse.Namespace:
+    """Read the options of a benchmark of captures: `data`, `only` and `markdown`."""
+    parser = argparse.ArgumentParser(description=description)
     beside = Path(__file__).resolve().parents[2] / "shared" / "data"
     parser.add_argument("--data", type=Path, default=beside)
     parser.add_argument("--only", default="")
@@ -102,7 +103,7 @@ def options_of_the_run() -> argparse.Namespace:
 
 
 def main() -> None:
-    options = options_of_the_run()
+    options = options_of_the_run(__doc__)
     conditions = {"as captured": named_only, "corrupted": corrupted}
     scores: list[list[str]] = []
     more: list[list[str]] = []

@@ -10,13 +10,10 @@ which the tracks were made. A track that the model excludes otherwise counts as 
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
-
 import numpy as np
 
 import asterism as am
-from captures import captures
+from captures import captures, options_of_the_run
 from report import conditions, publish, table
 
 NAMES = ("racing", "freeform", "tennis")
@@ -43,12 +40,7 @@ def differences(found: am.Tracks, truth: am.Tracks, model: am.TrackingModel) -> 
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    beside = Path(__file__).resolve().parents[2] / "shared" / "data"
-    parser.add_argument("--data", type=Path, default=beside)
-    parser.add_argument("--only", default="")
-    parser.add_argument("--markdown", type=Path)
-    options = parser.parse_args()
+    options = options_of_the_run(__doc__)
     takes = {
         path.name: am.read(path).tracks
         for path in captures(options.data)

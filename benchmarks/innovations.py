@@ -12,8 +12,6 @@ variance, 1 in the mean if calibrated. A marker is predicted from its third dete
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,7 +20,7 @@ import asterism as am
 from asterism import _engine
 from asterism.model.compiled import transition
 from asterism.tracking.estimation import fit_body_motion
-from captures import captures
+from captures import captures, options_of_the_run
 from report import conditions, publish, table
 
 if TYPE_CHECKING:
@@ -143,12 +141,7 @@ def innovations(
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    beside = Path(__file__).resolve().parents[2] / "shared" / "data"
-    parser.add_argument("--data", type=Path, default=beside)
-    parser.add_argument("--only", default="")
-    parser.add_argument("--markdown", type=Path)
-    options = parser.parse_args()
+    options = options_of_the_run(__doc__)
     rows: list[list[str]] = []
     for path in captures(options.data):
         capture = am.read(path) if options.only in path.name else None

@@ -9,15 +9,13 @@ one.
 
 from __future__ import annotations
 
-import argparse
 import time
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 import asterism as am
-from captures import captures, corrupted
+from captures import captures, corrupted, options_of_the_run
 from report import conditions, publish, table
 
 if TYPE_CHECKING:
@@ -44,12 +42,7 @@ def scenes() -> Iterator[tuple[str, am.Tracks]]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    beside = Path(__file__).resolve().parents[2] / "shared" / "data"
-    parser.add_argument("--data", type=Path, default=beside)
-    parser.add_argument("--only", default="")
-    parser.add_argument("--markdown", type=Path)
-    options = parser.parse_args()
+    options = options_of_the_run(__doc__)
     inputs = list(scenes())
     for path in captures(options.data):
         capture = am.read(path)
