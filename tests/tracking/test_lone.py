@@ -84,6 +84,18 @@ def test_the_probability_is_the_confidence_of_the_detection():
     assert 0.98 < found.tracks.confidence[FIRST] < 1
 
 
+def test_only_certain_detections_are_taken():
+    taken = []
+    for off in np.linspace(0, 0.3, 31):
+        before = missed([0, off, 0])
+        tracks = dataclasses.replace(before.tracks, confidence=np.ones(len(TRUTH.labels)))
+        found = with_lone_detections(dataclasses.replace(before, tracks=tracks), MODEL).tracks
+        taken.append(found.labels[FIRST] >= 0)
+        assert not taken[-1] or found.confidence[FIRST] > 0.98
+    assert any(taken)
+    assert not all(taken)
+
+
 def test_the_default_takes_a_jolt_as_its_recipe_does():
     points = TRUTH.detections.points.copy()
     points[FIRST] += [0, 0.02, 0]
