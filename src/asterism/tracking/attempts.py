@@ -286,8 +286,8 @@ def _with_reason(best: Uncorrected, first: Uncorrected) -> Uncorrected:
 def _reassigned(found: Uncorrected) -> Uncorrected:
     """Assign uncertain detections once more, while that makes more identities certain.
 
-    Distances decide, so that bonds must have made the tracks. The confidence uses the same ones: it
-    is too high for the result to be compared with another attempt.
+    Only tracks made with bonds are changed, because distances decide. The confidence uses the same
+    distances, so that it is too high afterwards to compare the result with another attempt.
     """
     best = found
     for _ in range(MAX_ROUNDS):

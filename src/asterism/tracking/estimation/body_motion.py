@@ -34,9 +34,9 @@ def fit_body_motion(
 
     `estimate_model` admits no acceleration by which a marker could reach its neighbour, because it
     could not tell it from a wrong link, and explains faster motion as noise. Bonds between markers
-    tell them apart, so that there is no such bound here. In tracks of single frames so many links
-    of fast markers are wrong that the fitted motion grows with each fit, so that `SMP` over three
-    frames is the default.
+    tell them apart, so that there is no such bound here. The default is `SMP` over three frames: by
+    single frames, so many links of fast markers are wrong that the fitted motion grows with each
+    fit.
 
     Parameters
     ----------
