@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <type_traits>
 
 #include "filter/axis_kernels.hpp"
 #include "filter/mode_lanes.hpp"
+#include "math/logarithm.hpp"
 
 namespace asterism {
 
@@ -122,6 +124,30 @@ ASTERISM_INLINED void update_modes(const AxisModel& m, const Point& y, MotionSta
   modes.update(m, y);
   modes.write(s);
 }
+template <int n, int M>
+ASTERISM_INLINED void expect_modes(const AxisModel& m, const MotionState& s, Prediction& out) {
+  ModeLanes<n, M> modes;
+  modes.read(s);
+  Lanes S = m.r, weight = 1.0;
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j) S = S + m.H[i] * modes.P[i][j] * m.H[j];
+  for (int b = 0; b < M; ++b) weight.at[b] = s.w[b];
+  const Lanes log_peak =
+      logarithm(weight) - 0.5 * m.D * logarithm(2 * std::numbers::pi * S);
+  for (int d = 0; d < kMaxAxes; ++d) {
+    Lanes y;
+    for (int i = 0; i < n; ++i) y = y + m.H[i] * modes.x[d][i];
+    for (int b = 0; b < M; ++b) out.y[b][d] = y.at[b];
+    y = weight * y;
+    out.center[d] = y.at[0];
+    for (int b = 1; b < M; ++b) out.center[d] += y.at[b];
+  }
+  for (int b = 0; b < M; ++b) {
+    out.w[b] = s.w[b];
+    out.S[b] = S.at[b];
+    out.log_peak[b] = log_peak.at[b];
+  }
+}
 #if defined(__GNUC__) && defined(__x86_64__)
 // The same for processors with registers of four doubles, with the same result.
 template <int n, int M>
@@ -132,6 +158,10 @@ template <int n, int M>
 template <int n, int M>
 [[gnu::target("avx2")]] void update_by_four(const AxisModel& m, const Point& y, MotionState& s) {
   update_modes<n, M>(m, y, s);
+}
+template <int n, int M>
+[[gnu::target("avx2")]] void expect_by_four(const AxisModel& m, const MotionState& s, Prediction& out) {
+  expect_modes<n, M>(m, s, out);
 }
 #endif
 
@@ -175,23 +205,35 @@ void predict(const MotionModel& m, const MotionStep& step, MotionState& s) {
 }
 
 Prediction::Prediction(const MotionModel& m, const MotionState& s) : M(m.M), D(m.axis.D) {
-  with_states(m.axis.n, [&](auto n) {
-    for (int b = 0; b < M; ++b) {
-      y[b] = observed_axis<n>(m.axis, s.mode[b]);
-      S[b] = innovation_variance_axis<n>(m.axis, s.mode[b]);
+  with_modes(m, [&](auto n, auto n_modes) {
+    if constexpr (n_modes == 1) {
+      y[0] = observed_axis<n>(m.axis, s.mode[0]);
+      S[0] = innovation_variance_axis<n>(m.axis, s.mode[0]);
+      log_peak[0] = log_density(D, S[0], 0);
+    } else {
+#if defined(__GNUC__) && defined(__x86_64__)
+      if (__builtin_cpu_supports("avx2")) return expect_by_four<n, n_modes>(m.axis, s, *this);
+#endif
+      expect_modes<n, n_modes>(m.axis, s, *this);
     }
   });
+  bool is_sound = true;
+  constexpr double kLeast = 1e-300, kMost = 1e300;
   for (int b = 0; b < M; ++b) {
-    if (M > 1) w[b] = s.w[b];
-    log_peak[b] = log_density(D, S[b], 0) + (M > 1 ? std::log(w[b]) : 0.0);
-    if (std::isfinite(log_peak[b])) continue;
+    if (S[b] > kLeast && S[b] < kMost && w[b] > 0) continue;
     // The filter has over- or underflowed. The density of this mode is set to zero everywhere.
     log_peak[b] = -std::numeric_limits<double>::infinity();
     S[b] = 1;
     y[b] = {};
+    is_sound = false;
   }
-  for (int b = 0; b < M; ++b)
-    for (int d = 0; d < D; ++d) center[d] += w[b] * y[b][d];
+  if (M == 1) {
+    center = y[0];
+  } else if (!is_sound) {
+    center = {};
+    for (int b = 0; b < M; ++b)
+      for (int d = 0; d < D; ++d) center[d] += w[b] * y[b][d];
+  }
 }
 
 double Prediction::log_likelihood(const Point& point, std::array<double, kMaxModes>& each) const {

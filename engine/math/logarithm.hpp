@@ -27,4 +27,10 @@ ASTERISM_INLINED double logarithm(double x) {
   return 2 * s * (sum * square + 1) + exponent * std::numbers::ln2;
 }
 
+ASTERISM_INLINED Lanes logarithm(const Lanes& x) {
+  Lanes out;
+  for (int i = 0; i < kLanes; ++i) out.at[i] = logarithm(x.at[i]);
+  return out;
+}
+
 }  // namespace asterism

@@ -9,6 +9,7 @@
 #include <numeric>
 #include <vector>
 
+#include "solve/dual_prices.hpp"
 #include "solve/joint_beam.hpp"
 
 namespace asterism {
@@ -43,34 +44,6 @@ MatchingMarginals only_best(const MatchingGraph& graph, std::int32_t n,
   }
   out.bound = 1;
   return out;
-}
-
-// The smallest prices p ≥ 0 at which every track prefers its detection in the best event, and the
-// remaining gain of each track. Prices rise from 0 and converge because the event is optimal.
-void find_prices(std::span<const Candidate> group, const GroupNumbering& by,
-                 std::span<const std::int32_t> partner, std::span<double> left,
-                 std::span<double> p) {
-  const std::int32_t n = by.n_rows();
-  std::vector<std::size_t> own(n, 0);
-  for (std::size_t e = 0; e < group.size(); ++e)
-    if (partner[by.row_of[e]] == n + by.column_of[e]) own[by.row_of[e]] = e;
-  const auto content = [&](std::int32_t i) {
-    left[i] = partner[i] < 0 ? 0 : group[own[i]].gain - p[partner[i] - n];
-  };
-  for (std::int32_t i = 0; i < n; ++i) content(i);
-  // Rounding may let ties rise for ever, so the rounds are limited. Any prices give correct
-  // results.
-  bool is_rising = true;
-  for (std::int32_t round = 0; round <= n && is_rising; ++round) {
-    is_rising = false;
-    for (std::size_t e = 0; e < group.size(); ++e) {
-      const std::int32_t i = by.row_of[e], j = by.column_of[e], holder = partner[n + j];
-      if (holder < 0 || holder == i || group[e].gain - left[i] <= p[j]) continue;
-      p[j] = group[e].gain - left[i];
-      content(holder);
-      is_rising = true;
-    }
-  }
 }
 
 // The links of a group, without weights. Those of a vertex are in the order of the candidates.
@@ -151,12 +124,7 @@ void JointEvents::price(std::size_t g) {
   const std::span<const Candidate> group = groups_[g];
   by_.number(group);
   const std::int32_t n = by_.n_rows(), m = by_.n_columns();
-  partner_.assign(n + m, -1);
-  for (std::size_t e = 0; e < group.size(); ++e)
-    if (best_[group[e].row] == group[e].column) {
-      partner_[by_.row_of[e]] = n + by_.column_of[e];
-      partner_[n + by_.column_of[e]] = by_.row_of[e];
-    }
+  list_partners(group, by_, best_, partner_);
   left_.assign(n, 0);
   price_.assign(m, 0);
   find_prices(group, by_, partner_, left_, price_);
