@@ -83,31 +83,46 @@ std::vector<Point> plain_points(const In<double>& array, const char* what) {
   return out;
 }
 
-// For each place, the two nearest points of a frame: (indices or -1, distances or inf).
-nb::tuple nearest_two(const In<double>& points, const In<std::int64_t>& offsets,
-                      const In<double>& places, const In<std::int64_t>& frames) {
-  const std::vector<Point> all = plain_points(points, "points: shape (N, 2 or 3)");
-  const std::vector<Point> from = plain_points(places, "places: shape (Q, 2 or 3)");
-  require(points.shape(1) == places.shape(1), "points and places with the same number of axes");
-  require_offsets(flat(offsets), all.size(), "offsets: increasing, within the points");
-  require(frames.ndim() == 1 && frames.shape(0) == from.size(), "frames: shape (Q,)");
-  const auto n_frames = static_cast<std::int64_t>(offsets.size()) - 1;
-  for (const std::int64_t t : flat(frames)) require(t >= 0 && t < n_frames, "frames: within offsets");
-  Owned<std::int64_t> index(2 * from.size());
-  Owned<double> distance(2 * from.size());
-  {
-    nb::gil_scoped_release release;
-    NearestInFrame nearest(all, flat(offsets), static_cast<int>(points.shape(1)));
-    for (std::size_t q = 0; q < from.size(); ++q) {
-      const NearestInFrame::Two two = nearest.of(from[q], frames.data()[q]);
-      for (int k = 0; k < 2; ++k) {
-        index.data[2 * q + k] = two.index[k];
-        distance.data[2 * q + k] = std::sqrt(two.distance2[k]);
+// The points of the frames of a capture, which are sorted when a frame is first asked for.
+class NearestPoints {
+ public:
+  NearestPoints(const In<double>& points, const In<std::int64_t>& offsets)
+      : points_(plain_points(points, "points: shape (N, 2 or 3)")),
+        offsets_(flat(offsets).begin(), flat(offsets).end()),
+        n_axes_(points.shape(1)),
+        nearest_(points_, offsets_, static_cast<int>(n_axes_)) {
+    require_offsets(offsets_, points_.size(), "offsets: increasing, within the points");
+  }
+  NearestPoints(const NearestPoints&) = delete;  // the spans would refer to the original
+
+  // For each place, the two nearest points of a frame: (indices or -1, distances or inf).
+  nb::tuple two(const In<double>& places, const In<std::int64_t>& frames) {
+    const std::vector<Point> from = plain_points(places, "places: shape (Q, 2 or 3)");
+    require(places.shape(1) == n_axes_, "points and places with the same number of axes");
+    require(frames.ndim() == 1 && frames.shape(0) == from.size(), "frames: shape (Q,)");
+    const auto n_frames = static_cast<std::int64_t>(offsets_.size()) - 1;
+    for (const std::int64_t t : flat(frames)) require(t >= 0 && t < n_frames, "frames: within offsets");
+    Owned<std::int64_t> index(2 * from.size());
+    Owned<double> distance(2 * from.size());
+    {
+      nb::gil_scoped_release release;
+      for (std::size_t q = 0; q < from.size(); ++q) {
+        const NearestInFrame::Two found = nearest_.of(from[q], frames.data()[q]);
+        for (int k = 0; k < 2; ++k) {
+          index.data[2 * q + k] = found.index[k];
+          distance.data[2 * q + k] = std::sqrt(found.distance2[k]);
+        }
       }
     }
+    return nb::make_tuple(index.give({from.size(), 2}), distance.give({from.size(), 2}));
   }
-  return nb::make_tuple(index.give({from.size(), 2}), distance.give({from.size(), 2}));
-}
+
+ private:
+  std::vector<Point> points_;
+  std::vector<std::int64_t> offsets_;
+  std::size_t n_axes_;
+  NearestInFrame nearest_;
+};
 
 // Pairs rows and columns of a sparse list of gains, ordered by row, for the largest sum of gains.
 Out<std::int32_t> assign(std::int32_t n_rows, std::int32_t n_columns, const In<std::int32_t>& rows,
@@ -219,7 +234,9 @@ nb::tuple pack(const In<std::int64_t>& first_option, const In<double>& weights,
 
 void bind_solvers(nb::module_& module) {
   module.def("assign", &assign, "n_rows"_a, "n_columns"_a, "rows"_a, "columns"_a, "gains"_a);
-  module.def("nearest_two", &nearest_two, "points"_a, "offsets"_a, "places"_a, "frames"_a);
+  nb::class_<NearestPoints>(module, "NearestPoints")
+      .def(nb::init<const In<double>&, const In<std::int64_t>&>(), "points"_a, "offsets"_a)
+      .def("two", &NearestPoints::two, "places"_a, "frames"_a);
   module.def("marry", &marry, "first"_a, "receivers"_a, "costs"_a, "n_receivers"_a);
   module.def("k_best", &k_best, "cost"_a, "k"_a);
   module.def("pack", &pack, "first_option"_a, "log_weights"_a, "first_use"_a, "uses"_a, "k"_a,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from asterism._engine import nearest_two
+from asterism._engine import NearestPoints
 
 
 @pytest.mark.parametrize("n_axes", [2, 3])
@@ -18,7 +18,7 @@ def test_the_two_nearest_points_are_those_of_a_tree(n_axes, sparse):
     points = rng.normal(size=(offsets[-1], n_axes)) * [1.0, 3.0, 0.1][:n_axes]
     places = rng.normal(size=(300, n_axes))
     frames = rng.integers(0, len(counts), 300)
-    index, distance = nearest_two(points, offsets, places, frames)
+    index, distance = NearestPoints(points, offsets).two(places, frames)
     for q, t in enumerate(frames):
         if counts[t] == 0:
             assert (index[q] == -1).all()
@@ -32,7 +32,7 @@ def test_the_two_nearest_points_are_those_of_a_tree(n_axes, sparse):
 
 def test_of_equally_near_points_the_first_counts():
     points = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, 1.0], [0.0, -1.0]])
-    index, distance = nearest_two(points, np.array([0, 5]), np.zeros((1, 2)), np.array([0]))
+    index, distance = NearestPoints(points, np.array([0, 5])).two(np.zeros((1, 2)), np.array([0]))
     np.testing.assert_array_equal(index, [[0, 1]])
     np.testing.assert_array_equal(distance, [[1.0, 1.0]])
 
@@ -48,4 +48,4 @@ def test_of_equally_near_points_the_first_counts():
 )
 def test_wrong_arrays_are_refused(places, frames, what):
     with pytest.raises(ValueError, match=what):
-        nearest_two(np.zeros((4, 2)), np.array([0, 4]), places, frames)
+        NearestPoints(np.zeros((4, 2)), np.array([0, 4])).two(places, frames)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from asterism._engine import nearest_two
+from asterism._engine import NearestPoints
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -105,5 +105,5 @@ def _is_left_over(
     )
     places = d.points[now] + (d.points[now] - d.points[before]) * step[:, None]
     offsets = np.concatenate([[0], np.cumsum(np.bincount(d.frame_of[free], minlength=d.n_frames))])
-    distance = nearest_two(d.points[free], offsets, places, t + way)[1][:, 0]
+    distance = NearestPoints(d.points[free], offsets).two(places, t + way)[1][:, 0]
     return np.asarray(distance <= reach)

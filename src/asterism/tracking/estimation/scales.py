@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from asterism._engine import nearest_two
+from asterism._engine import NearestPoints
 from asterism.errors import ParameterError
 from asterism.records import record
 
@@ -190,30 +190,32 @@ def _follow(d: Detections, stride: int) -> _Links:
     offsets = np.concatenate([[0], np.cumsum(d.counts[used])])
     frame = np.repeat(np.arange(len(used)), d.counts[used])
     first = np.flatnonzero(is_first[is_used][frame])
-    link, spacing, distance = _sure_links(points, offsets, frame, first)
+    nearest = NearestPoints(points, offsets)
+    spacing = nearest.two(points[first], frame[first])[1][:, 1]
+    link, distance = _sure_links(nearest, points, frame, first)
     is_linked = link >= 0
     a, b = first[is_linked], link[is_linked]
     velocity = (points[b] - points[a]) / np.diff(times)[frame[a], None]
-    onward, _, _ = _sure_links(points, offsets, frame, b)
+    onward, _ = _sure_links(nearest, points, frame, b)
     c, before, b = onward[onward >= 0], velocity[onward >= 0], b[onward >= 0]
     jolt = (points[c] - points[b]) / np.diff(times)[frame[b], None] - before
     return _Links(velocity, jolt, spacing, used[frame[first]].astype(np.int64), distance)
 
 
 def _sure_links(
+    nearest: NearestPoints,
     points: NDArray[np.float64],
-    offsets: NDArray[np.int64],
     frame: NDArray[np.int64],
     chosen: NDArray[np.int64],
-) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Link chosen points to the next frame if the link is unambiguous.
 
     Parameters
     ----------
+    nearest : NearestPoints
+        Search among the points.
     points : ndarray of shape (N, D)
         Points of all frames.
-    offsets : ndarray of int, shape (T + 1,)
-        First point of each frame.
     frame : ndarray of int, shape (N,)
         Frame of each point.
     chosen : ndarray of int, shape (M,)
@@ -223,17 +225,17 @@ def _sure_links(
     -------
     link : ndarray of int, shape (M,)
         Point of the next frame, -1 for an ambiguous link.
-    spacing : ndarray of shape (M,)
-        Distance to the nearest other point of the frame, inf if there is none.
     distance : ndarray of shape (M,)
         Distance to the nearest point of the next frame, metres.
     """
     t = frame[chosen]
-    spacing = nearest_two(points, offsets, points[chosen], t)[1][:, 1]
-    nearest, distance = nearest_two(points, offsets, points[chosen], t + 1)
-    clear = np.flatnonzero(distance[:, 0] < 0.3 * np.minimum(distance[:, 1], spacing))
-    next_one = nearest[clear, 0]
-    back = nearest_two(points, offsets, points[next_one], t[clear])[0][:, 0]
+    following, distance = nearest.two(points[chosen], t + 1)
+    clear = np.flatnonzero(distance[:, 0] < 0.3 * distance[:, 1])
+    # Other points of the frame must be as far as the second one of the next frame.
+    spacing = nearest.two(points[chosen[clear]], t[clear])[1][:, 1]
+    clear = clear[distance[clear, 0] < 0.3 * spacing]
+    next_one = following[clear, 0]
+    back = nearest.two(points[next_one], t[clear])[0][:, 0]
     link = np.full(len(chosen), -1)
     link[clear] = np.where(back == chosen[clear], next_one, -1)
-    return link, spacing, distance[:, 0]
+    return link, distance[:, 0]
