@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import numpy as np
@@ -90,6 +91,10 @@ class InteractingMotions(Motion):
         )
 
     def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:  # kept, because a stream looks the motion up in every frame
         return hash((self.models, self.transitions.tobytes()))
 
     @property

@@ -215,7 +215,10 @@ class EngineMethod(Method[EngineState]):
             info=self._about(found.stats),
             read_tracks=partial(_tracks_of, found.tracker),
         )
-        return replace(state, tracker=found.tracker), update
+        after = EngineState(
+            model=state.model, n_axes=state.n_axes, tracker=found.tracker, about=state.about
+        )
+        return after, update
 
     def run(
         self,
