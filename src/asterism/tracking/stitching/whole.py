@@ -7,7 +7,7 @@ stable distances do, because body segments move almost rigidly.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +20,7 @@ from asterism.tracking.rigidity.bonds import Bonds, learn_bonds
 from asterism.tracking.stitching.agreement import agreeing
 from asterism.tracking.stitching.exchanged import exchanged_by_distances
 from asterism.tracking.stitching.passes import Pass, go_through
+from asterism.tracking.stitching.returned import STEADY, returned
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -274,14 +275,20 @@ def _joined_by_distances(
     markers, after, probabilities = (
         each.copy() for each in (found.markers, found.after, found.probabilities)
     )
-    labels = np.append(np.maximum(markers, -1), -1).astype(np.int64)[found.tracklets]
-    tracks = Tracks(detections=d, labels=labels)
-    for earlier, later in agreeing(tracks, noise_sigma, max_occlusion):
-        markers[markers == later] = earlier
-        own = np.flatnonzero(markers == earlier)  # tracklets are numbered by their start
-        is_new = after[own[1:]] != own[:-1]
-        after[own[1:]] = own[:-1]
-        probabilities[own[1:][is_new]] = AGREEING
+    within, between = (partial(returned, steady=each) for each in STEADY)
+    for find in (agreeing, within, agreeing, between, agreeing):
+        labels = np.append(np.maximum(markers, -1), -1).astype(np.int64)[found.tracklets]
+        tracks = Tracks(detections=d, labels=labels)
+        joined: dict[int, int] = {}
+        for earlier, later in find(tracks, noise_sigma, max_occlusion):
+            while earlier in joined:
+                earlier = joined[earlier]
+            joined[later] = earlier
+            markers[markers == later] = earlier
+            own = np.flatnonzero(markers == earlier)  # tracklets are numbered by their start
+            is_new = after[own[1:]] != own[:-1]
+            after[own[1:]] = own[:-1]
+            probabilities[own[1:][is_new]] = AGREEING
     used, numbers = np.unique(markers[markers >= 0], return_inverse=True)
     if len(used) <= markers.max(initial=-1):
         markers[markers >= 0] = numbers
