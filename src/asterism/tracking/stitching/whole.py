@@ -171,8 +171,9 @@ def stitch(
 
     Three passes go through the capture, forward, backward and forward again; the joins of each
     pass are prior information for the next. At the end two tracks are joined if they are in no
-    frame together and keep the same distances to other tracks, and two tracks are exchanged where
-    these distances show that they have each other's marker.
+    frame together and keep the same distances to other tracks, bodies that left the view and came
+    back are joined by the distances among their markers, and two tracks are exchanged where these
+    distances show that they have each other's marker.
 
     Short pure tracklets give the best result: limit the model's gap by `tracklet_model`, as
     `track` does.
@@ -271,7 +272,7 @@ def stitch(
 def _joined_by_distances(
     d: Detections, found: Pass, noise_sigma: float, max_occlusion: int | None
 ) -> Pass:
-    """Join tracks that follow each other and keep the same distances to others."""
+    """Join tracks that keep the same distances, to others or as bodies among themselves."""
     markers, after, probabilities = (
         each.copy() for each in (found.markers, found.after, found.probabilities)
     )
