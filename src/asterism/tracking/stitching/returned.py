@@ -157,7 +157,7 @@ def _alike(steady: _Steady, follows: NDArray[np.bool_]) -> dict[Pair, dict[Pair,
     found: dict[Pair, dict[Pair, float]] = {}
     later = np.concatenate([steady.tracks, steady.tracks[:, ::-1]])
     medians, spreads = np.tile(steady.median, 2), np.tile(steady.spread, 2)
-    for (a, b), median, spread in zip(steady.tracks.tolist(), steady.median, steady.spread):
+    for (a, b), median, spread in zip(*steady, strict=True):
         at = np.flatnonzero(follows[a, later[:, 0]] & follows[b, later[:, 1]])
         off, both = median - medians[at], np.hypot(spread, spreads[at])
         ratio = _log_t(off, both) - _log_t(off, np.hypot(both, UNKNOWN))
@@ -224,9 +224,7 @@ def _threes(alike: dict[Pair, dict[Pair, float]]) -> Iterator[list[Pair]]:
                 yield [one, two, three]
 
 
-def _clear(
-    bodies: dict[tuple[Pair, ...], float], may_be_one: NDArray[np.bool_]
-) -> list[list[int]]:
+def _clear(bodies: dict[tuple[Pair, ...], float], may_be_one: NDArray[np.bool_]) -> list[list[int]]:
     """Return the tracks of each marker, by the bodies that no other body contradicts."""
     ranked = sorted(bodies.items(), key=lambda each: (-each[1], each[0]))
     left = dict(ranked)  # those that no clear body excludes
