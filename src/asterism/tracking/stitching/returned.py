@@ -157,7 +157,7 @@ def _alike(steady: _Steady, follows: NDArray[np.bool_]) -> dict[Pair, dict[Pair,
     found: dict[Pair, dict[Pair, float]] = {}
     later = np.concatenate([steady.tracks, steady.tracks[:, ::-1]])
     medians, spreads = np.tile(steady.median, 2), np.tile(steady.spread, 2)
-    for (a, b), median, spread in zip(*steady, strict=True):
+    for (a, b), median, spread in zip(*(each.tolist() for each in steady), strict=True):
         at = np.flatnonzero(follows[a, later[:, 0]] & follows[b, later[:, 1]])
         off, both = median - medians[at], np.hypot(spread, spreads[at])
         ratio = _log_t(off, both) - _log_t(off, np.hypot(both, UNKNOWN))
