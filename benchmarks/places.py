@@ -4,7 +4,8 @@ Simulated people with seeds that the calibration does not use, and the captures 
 ``../shared/data`` (or ``--data``) in four conditions. A switch is a run of detections that are of
 another marker than most of their track; runs where the labels of the file are wrong are counted
 and left out (`wrong.py`). Precision: share of the first 20 places with wrong detections, of
-another marker or of clutter, in one of their tracks within half a second. Recall: share of the
+another marker or of clutter, in one of their tracks within half a second; places where the labels
+of the file alone are wrong do not count. Recall: share of the
 switches in the first 20 places, where there are at most 15. Perfect results have no wrong
 detection; of these, places a minute.
 
@@ -68,7 +69,11 @@ class Group:
             self.places += len(places)
             self.minutes += float(times[-1] - times[0]) / 60
             return [*row, "–", "–"]
-        precision = [any(holds(place, each, times) for each in wrong) for place in first]
+        is_right = [any(holds(place, each, times) for each in wrong) for place in first]
+        is_known = [not any(holds(place, each, times) for each in runs) for place in first]
+        precision = [
+            right for right, known in zip(is_right, is_known, strict=True) if right or known
+        ]
         recall = [any(holds(place, each, times) for place in first) for each in switches]
         if precision:
             self.precision.append(float(np.mean(precision)))
