@@ -36,7 +36,9 @@ def frame(number):
     seen = gaps == 0
     points = np.concatenate([at[seen], [[0.5, 0.5, 1.5]]])
     labels = np.append(tracks.ids[seen], -1)
-    return LiveFrame(number=number, time=number / 100, points=points, labels=labels, tracks=tracks)
+    return LiveFrame(
+        number=number, time=number / 100, points=points, labels=labels, read_tracks=lambda: tracks
+    )
 
 
 class Shown:

@@ -116,7 +116,8 @@ class PageSink:
             self.on_address(address)
 
     def send(self, frame: LiveFrame) -> None:
-        """Keep the frame for the pages."""
+        """Keep the frame for the pages, with its tracks."""
+        _ = frame.tracks  # computed in the thread of the loop
         self._frame = frame
 
     def show(self, run: LiveRun) -> None:
