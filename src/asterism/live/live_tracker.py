@@ -116,7 +116,7 @@ class LiveTracker:
         if not isinstance(marker_sets, str) and marker_sets:
             self._outer = Named(marker_sets=tuple(marker_sets), method=self._inner)
         self.model = model
-        self.state: Any = None if model is None else self._outer.init(model, seed=seed)
+        self._state: Any = None if model is None else self._outer.init(model, seed=seed)
         self._refines = model is None
         self._history: deque[_Past] = deque()
         self._n_forgotten = 0
@@ -155,10 +155,10 @@ class LiveTracker:
         covariances: NDArray[np.float64] | None,
     ) -> Update:
         update = Update(labels=np.full(len(points), -1, dtype=np.int64))
-        if self.state is not None:
+        if self._state is not None:
             try:
-                self.state, update = self._outer.step(
-                    self.state, time, points, covariances=covariances
+                self._state, update = self._outer.step(
+                    self._state, time, points, covariances=covariances
                 )
             except SolverLimit as error:
                 self._faults.add("too_dense", f"a frame cannot be tracked ({error})")
@@ -184,7 +184,7 @@ class LiveTracker:
             inner=self._method.init(self.model, seed=self._seed),
             ids=np.empty(0, dtype=np.int64), next_id=before.next_id, n_before=before.n_seen,
         )  # fmt: skip
-        self.state = NamedState(tracks=state) if isinstance(self.state, NamedState) else state
+        self._state = NamedState(tracks=state) if isinstance(self._state, NamedState) else state
 
     def recent(self) -> Detections:
         """Return the frames of the last seconds."""
@@ -214,7 +214,7 @@ class LiveTracker:
 
     def learn_names(self) -> bool:
         """Learn a marker set when that is wanted and there are enough frames; return whether."""
-        history, state = self._history, self.state
+        history, state = self._history, self._state
         if not self._learns_names or self._rehearsal is not None or state is None or not history:
             return False
         last = history[-1].time
@@ -238,7 +238,7 @@ class LiveTracker:
             )
         )
         self._outer = outer = Named(marker_sets=learnt, method=self._inner)
-        self.state = outer.begin(state, names, [(p.points, p.labels) for p in recent])
+        self._state = outer.begin(state, names, [(p.points, p.labels) for p in recent])
         self._learns_names = False
         if not self._refines:
             history.clear()
@@ -259,20 +259,20 @@ class LiveTracker:
             n_before=n_seen - rehearsal.state.n_seen if before is not None else 0,
         )  # fmt: skip
         if isinstance(self._outer, Switchable):
-            self.state = state
-        elif self.state is None:
-            self.state = NamedState(tracks=state)
+            self._state = state
+        elif self._state is None:
+            self._state = NamedState(tracks=state)
         else:
-            self.state = replace(self.state, tracks=state)
+            self._state = replace(self._state, tracks=state)
         self._rehearsal, self.model = None, rehearsal.model
         self.n_models += 1
 
     def _switchable_state(self) -> SwitchableState | None:
-        state = self.state.tracks if isinstance(self.state, NamedState) else self.state
+        state = self._state.tracks if isinstance(self._state, NamedState) else self._state
         assert state is None or isinstance(state, SwitchableState)
         return state
 
     @property
     def n_names(self) -> int:
         """Number of named tracks."""
-        return len(self.state.names) if isinstance(self.state, NamedState) else 0
+        return len(self._state.names) if isinstance(self._state, NamedState) else 0

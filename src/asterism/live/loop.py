@@ -195,7 +195,6 @@ class LiveLoop:
         if self._first_time is None:
             self._first_time = frame.time
         self._elapsed = frame.time - self._first_time
-        before = self._tracker.state
         self._last = update = self._tracker.step(accepted, period)
         done = LiveFrame(
             number=frame.number, time=frame.time, points=frame.points, labels=update.labels,
@@ -209,7 +208,6 @@ class LiveLoop:
                 self._faults.add("sinks", f"{sink.name} fails and is left out ({error})")
                 self._sinks.remove(sink)
         self._latency.add(perf_counter() - frame.received)
-        del before  # freeing a state takes time, which no sink waits for
         self._n_frames += 1
         if self._n_frames % COLLECT == 0:
             gc.collect()
