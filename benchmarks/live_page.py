@@ -3,7 +3,8 @@
 Two people with 50 markers each, occluded in bursts, are played at 100 Hz and tracked, and the page
 shows them with their trails. It is measured several times for five seconds: intervals of animation
 frames, frames of the stream that were drawn, and the share of a processor that the thread of the
-page takes. Chromium draws on the processor.
+page takes. Chromium draws on the processor. The first row is an empty page, the most that the
+machine allows at that time.
 
     python benchmarks/live_page.py [--seconds S] [--picture FILE] [--markdown FILE]
 """
@@ -15,6 +16,7 @@ import importlib
 import os
 import queue
 import sys
+import tempfile
 import threading
 import time
 from pathlib import Path
@@ -32,7 +34,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "reportin
 Browser: Any = importlib.import_module("browser").Browser
 RATE, N_MARKERS = 100.0, 100
 COUNT = """new Promise((done) => {
-  const times = [], frames = asterism.capture.frames, first = frames[0];
+  const times = [], frames = globalThis.asterism?.capture.frames ?? [0], first = frames[0];
   let [last, drawn] = [first, 0];
   const tick = (now) => {
     times.push(now);
@@ -74,26 +76,35 @@ def busy(page: Any) -> float:
     return next(m["value"] for m in metrics if m["name"] == "TaskDuration")
 
 
+def counted(name: str, page: Any) -> list[str]:
+    """Measure a page for five seconds; return the row of the table."""
+    page.call("Performance.enable", timeDomain="threadTicks")
+    worked = busy(page)
+    times, n_drawn, n_passed = page.run(COUNT)
+    worked = busy(page) - worked
+    steps, took = np.diff(times), (times[-1] - times[0]) / 1e3
+    row = [
+        name, f"{1e3 / steps.mean():.1f}", f"{np.median(steps):.1f}",
+        f"{np.quantile(steps, 0.99):.1f}", f"{n_drawn / took:.1f}", f"{n_passed / took:.0f}",
+        f"{100 * worked / took:.0f} %", f"{os.getloadavg()[0]:.1f}",
+    ]  # fmt: skip
+    print(*row, flush=True)
+    return row
+
+
 def measured(addresses: queue.Queue[str], seconds: float, picture: Path | None) -> list[list[str]]:
-    """Open the page and measure it; return the rows of the table."""
+    """Open an empty page and that of the stream; return the rows of the table."""
     browser = Browser()
     try:
+        with tempfile.NamedTemporaryFile(suffix=".html") as empty:
+            empty.write(b'<body data-ready="true">')
+            empty.flush()
+            page = browser.page(empty.name)
+            rows = [counted("empty", page)]
+            page.close()
         page = browser.page(addresses.get())
-        page.call("Performance.enable", timeDomain="threadTicks")
         page.wait(f"asterism.capture.slots.size >= {N_MARKERS} && document.body.dataset.fps > 0")
-        rows: list[list[str]] = []
-        for _ in range(int(seconds / 5)):
-            worked = busy(page)
-            times, n_drawn, n_passed = page.run(COUNT)
-            worked = busy(page) - worked
-            steps, took = np.diff(times), (times[-1] - times[0]) / 1e3
-            rows.append([
-                f"{1e3 / steps.mean():.1f}", f"{np.median(steps):.1f}",
-                f"{np.quantile(steps, 0.99):.1f}", f"{n_drawn / took:.1f}",
-                f"{n_passed / took:.0f}", f"{100 * worked / took:.0f} %",
-                f"{os.getloadavg()[0]:.1f}",
-            ])  # fmt: skip
-            print(*rows[-1], flush=True)
+        rows += [counted("stream", page) for _ in range(int(seconds / 5))]
         if picture is not None:
             picture.write_bytes(page.screenshot())
         for complaint in page.complaints():
@@ -126,7 +137,7 @@ def main() -> None:
     threading.Thread(target=look, daemon=True).start()
     sink = PageSink(on_address=addresses.put)
     run = am.live.run(InTime(made.detections), [sink], method="gnn", model=model, stop=stop)
-    head = ["animation frames/s", "interval: median, ms", "99 %", "drawn/s", "stream, Hz",
+    head = ["page", "animation frames/s", "interval: median, ms", "99 %", "drawn/s", "stream, Hz",
             "page busy", "load"]  # fmt: skip
     publish([*table(head, rows), "", f"{run.n_tracks} tracks, {conditions()}."], options.markdown)
 

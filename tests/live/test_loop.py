@@ -12,6 +12,7 @@ import pytest
 
 import asterism as am
 from asterism.errors import SinkError, SourceError
+from asterism.live.switchable import Switchable
 from asterism.tracking import Stitched
 from tests.live.judged import judged
 from tests.live.sources import LOST, Kept, Memory, Unreachable, frames_of, with_faults
@@ -68,6 +69,30 @@ def test_header_and_counts(scene):
     assert run.model is model
     assert seen
     assert seen[-1].source == "memory"
+
+
+def test_the_states_of_tracks_are_computed_for_the_sinks_that_use_them(
+    scene, tmp_path, monkeypatch
+):
+    made, model = scene
+    frames, step, n_reads = frames_of(made.detections.part(0, 60)), Switchable.step, []
+
+    def counted(*args, **options):
+        state, update = step(*args, **options)
+
+        def read():
+            n_reads.append(1)
+            return update.tracks
+
+        return state, dataclasses.replace(update, read_tracks=read)
+
+    monkeypatch.setattr(Switchable, "step", counted)
+    run = am.live.run(Memory(frames), [str(tmp_path / "a.csv")], model=model, method="gnn")
+    assert len(n_reads) < 10  # for the counts
+    assert run.n_tracks > 20
+    n_reads.clear()
+    am.live.run(Memory(frames), [str(tmp_path / "a.jsonl")], model=model, method="gnn")
+    assert len(n_reads) == 60
 
 
 FAULTS = {

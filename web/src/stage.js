@@ -28,12 +28,13 @@ export class Stage {
    * @param {import("./unpack.js").Capture} capture
    * @param {import("./state.js").State} state
    * @param {HTMLCanvasElement} canvas
+   * @param {boolean} antialias whether the edges of lines are smoothed
    */
-  constructor(capture, state, canvas) {
+  constructor(capture, state, canvas, antialias = true) {
     this.capture = capture;
     this.state = state;
     this.canvas = canvas;
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
+    this.renderer = new WebGLRenderer({ canvas, antialias, alpha: true });
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
     this.renderer.setClearColor(0, 0);
     this.scene = new Scene();

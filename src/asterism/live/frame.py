@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from asterism.records import record
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -86,8 +89,9 @@ class LiveFrame:
         Identity of the track of each point, as in `tracks.ids`; -1 for clutter.
     names : tuple of (str or None), optional
         Marker name of each point, None if it is unknown.
-    tracks : TrackStates, optional
-        States of all tracks, occluded ones included.
+    read_tracks : callable, optional
+        Computes `tracks` at its first use, from the state of the tracker after the frame, which is
+        kept as long as the frame. A sink uses `tracks` within `send`, in the thread of the loop.
     received, done : float
         `time.perf_counter` at the reception of the frame and after its tracking, seconds.
 
@@ -103,6 +107,11 @@ class LiveFrame:
     points: NDArray[np.float64]
     labels: NDArray[np.int64]
     names: tuple[str | None, ...] | None = None
-    tracks: TrackStates | None = None
+    read_tracks: Callable[[], TrackStates | None] | None = None
     received: float = 0.0
     done: float = 0.0
+
+    @cached_property
+    def tracks(self) -> TrackStates | None:
+        """States of all tracks, occluded ones included; None if there are none."""
+        return None if self.read_tracks is None else self.read_tracks()

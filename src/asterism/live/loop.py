@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from asterism.live.sinks.base import Sink
     from asterism.live.sources.base import Source
     from asterism.model import MarkerSet, TrackingModel
-    from asterism.tracking.methods import Method
+    from asterism.tracking.methods import Method, Update
 
 __all__ = ["LiveLoop"]
 
@@ -84,7 +84,8 @@ class LiveLoop:
         self._next_estimate = FIRST_SECONDS if model is None else math.inf
         self._first_time: float | None = None
         self._elapsed = 0.0  # seconds of the stream
-        self._n_frames = self._n_tracks = 0
+        self._n_frames = 0
+        self._last: Update | None = None
         self._last_arrival = math.inf
         self._is_silent = False
 
@@ -128,8 +129,10 @@ class LiveLoop:
         for other in (self._source, *self._sinks):
             faults |= {f"{other.name} {kind}": n for kind, n in other.faults.items() if n}
         period = self._intake.period
+        tracks = None if self._last is None else self._last.tracks
         return LiveRun(
-            source=self._source.name, n_frames=self._n_frames, n_tracks=self._n_tracks,
+            source=self._source.name, n_frames=self._n_frames,
+            n_tracks=0 if tracks is None else len(tracks),
             n_names=self._tracker.n_names, rate=1 / period if period else math.nan,
             latency=self._latency, drift=self._clock.drift, faults=faults,
             model=self._tracker.model, n_models=self._tracker.n_models,
@@ -192,12 +195,11 @@ class LiveLoop:
         if self._first_time is None:
             self._first_time = frame.time
         self._elapsed = frame.time - self._first_time
-        update = self._tracker.step(accepted, period)
-        tracks = update.tracks
-        self._n_tracks = 0 if tracks is None else len(tracks)
+        self._last = update = self._tracker.step(accepted, period)
         done = LiveFrame(
             number=frame.number, time=frame.time, points=frame.points, labels=update.labels,
-            names=update.names, tracks=tracks, received=frame.received, done=perf_counter(),
+            names=update.names, read_tracks=lambda: update.tracks, received=frame.received,
+            done=perf_counter(),
         )  # fmt: skip
         for sink in tuple(self._sinks):
             try:

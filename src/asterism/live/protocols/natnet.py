@@ -154,10 +154,7 @@ class Reader:
     def values(self, layout: str) -> tuple[float, ...]:
         """Read numbers of a layout of `struct`, without its byte order."""
         layout = f"<{layout}"
-        self._need(struct.calcsize(layout))
-        found = struct.unpack_from(layout, self._body, self._at)
-        self._at += struct.calcsize(layout)
-        return found
+        return struct.unpack(layout, self.take(struct.calcsize(layout)))
 
     def count(self) -> int:
         """Read a number of things, which cannot be more than there are bytes."""
@@ -181,13 +178,11 @@ class Reader:
 
     def take(self, n: int) -> memoryview:
         """Read bytes."""
-        self._need(n)
-        self._at += n
-        return self._body[self._at - n : self._at]
-
-    def _need(self, n: int) -> None:
-        if n > self.n_left:
+        begin, end = self._at, self._at + n
+        if end > len(self._body):
             raise PacketError(f"{n} bytes where {self.n_left} are left")
+        self._at = end
+        return self._body[begin:end]
 
 
 def text_bytes(text: str) -> bytes:

@@ -125,9 +125,10 @@ def encode_positions(
     """
     rows = np.zeros(len(positions), _ROWS[order, kind])
     rows["place"] = positions * _MM
-    missing = np.isnan(positions).any(axis=1)
-    if missing.any():
+    is_nan = np.isnan(positions)
+    if is_nan.any():
         # Clients test a missing marker by all 32 bits, which is one of many patterns of NaN.
+        missing = is_nan.any(axis=1)
         rows.view(f"{order}u4").reshape(len(rows), -1)[missing, :3] = 0xFFFFFFFF
     if ids is not None:
         rows["id"] = ids & 0xFFFFFFFF

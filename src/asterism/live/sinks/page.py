@@ -116,7 +116,8 @@ class PageSink:
             self.on_address(address)
 
     def send(self, frame: LiveFrame) -> None:
-        """Keep the frame for the pages."""
+        """Keep the frame for the pages, with its tracks."""
+        _ = frame.tracks  # computed in the thread of the loop
         self._frame = frame
 
     def show(self, run: LiveRun) -> None:
@@ -173,7 +174,9 @@ class PageSink:
 
 
 def _listening(name: str, port: int) -> socket.socket:
-    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    # asyncio sends small packets at once only on sockets whose protocol is given; otherwise a frame
+    # waits up to 40 ms for the acknowledgement of the one before.
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     try:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind(("127.0.0.1", port))

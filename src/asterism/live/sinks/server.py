@@ -67,14 +67,12 @@ def served(frame: LiveFrame, place: dict[str, int]) -> ServedFrame:
         Place of each name among the markers; a point of another name is one of the other points.
     """
     markers = np.full((len(place), 3), np.nan)
-    names = frame.names or (None,) * len(frame.points)
-    at = np.array([-1 if n is None else place.get(n, -1) for n in names], dtype=np.int64)
-    is_named = at >= 0
-    markers[at[is_named]] = frame.points[is_named]
+    points, labels = frame.points, frame.labels
+    if frame.names is not None:
+        at = np.array([-1 if n is None else place.get(n, -1) for n in frame.names], dtype=np.int64)
+        is_named = at >= 0
+        markers[at[is_named]] = points[is_named]
+        points, labels = points[~is_named], labels[~is_named]
     return ServedFrame(
-        number=frame.number,
-        time=frame.time,
-        markers=markers,
-        points=frame.points[~is_named],
-        ids=frame.labels[~is_named] + 1,
+        number=frame.number, time=frame.time, markers=markers, points=points, ids=labels + 1
     )
