@@ -131,7 +131,8 @@ class AssignmentScore {
   // Of a detection by the motion of its track; 0 where it is not known.
   double motion(std::int64_t i, const SmoothMotion& of_track) const {
     const double off2 = squared_distance(all_.points[i], of_track.mean, all_.D);
-    return kMotion * (of_track.peak - (3 + all_.D) / 2.0 * std::log1p(off2 * of_track.per_variance));
+    const double fall = (3 + all_.D) / 2.0 * std::log1p(off2 * of_track.per_variance);
+    return kMotion * (of_track.peak - fall);
   }
 
  private:

@@ -33,7 +33,8 @@ class FrameAssignment {
  private:
   void assign(std::int64_t t) {
     const OpenFrames& all = score_.all();
-    for (std::int64_t k = 0; k < score_.n_tracks(); ++k) motion_[k] = score_.between(k, around(t, k));
+    for (std::int64_t k = 0; k < score_.n_tracks(); ++k)
+      motion_[k] = score_.between(k, around(t, k));
     const std::int64_t first = all.offsets[t], end = all.offsets[t + 1];
     candidates_.clear();
     match_.assign(end - first, -1);
