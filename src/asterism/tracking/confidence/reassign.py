@@ -16,10 +16,12 @@ if TYPE_CHECKING:
     from asterism.model import Tracks
     from asterism.tracking.stitching import Stitching
 
-__all__ = ["UNCERTAIN", "ghost_log_odds", "reassigned"]
+__all__ = ["PROBABLE", "UNCERTAIN", "ghost_log_odds", "reassigned"]
 
 UNCERTAIN = 0.8
 """Confidence of an identity below which a correction assigns a detection again."""
+PROBABLE = float(np.log(4))
+"""Log odds that a detection without a track must have to be taken."""
 CHANGE = 0.2
 """Log odds that a change must gain, so that labels of equal odds do not alternate."""
 ROUNDS = 3
@@ -67,7 +69,7 @@ def reassigned(
     for _ in range(ROUNDS):
         engine = learn_profiles(d, labels, noise_sigma).engine
         found = engine.assigned(
-            points, labels, offsets, is_open, ghost, sigma[: labels.max(initial=-1) + 1],
+            points, labels, offsets, is_open, ghost + PROBABLE, sigma[: labels.max(initial=-1) + 1],
             log_clutter=log_clutter, change=CHANGE, max_gap=REACH,
         )  # fmt: skip
         if np.array_equal(found, labels):

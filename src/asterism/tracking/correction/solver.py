@@ -9,7 +9,7 @@ import numpy as np
 
 from asterism.model import Tracks
 from asterism.tracking.confidence.identity import assess
-from asterism.tracking.confidence.reassign import UNCERTAIN, reassigned
+from asterism.tracking.confidence.reassign import PROBABLE, UNCERTAIN, reassigned
 from asterism.tracking.correction.constraints import Constraints, detections_of
 from asterism.tracking.correction.evidence import Evidence
 from asterism.tracking.correction.exchange import Lane, Motion, best_exchange
@@ -29,8 +29,6 @@ CANDIDATES = 3
 """Number of other tracks that are considered for a part that leaves its track."""
 CLUTTER = -2
 """Label, while an edit is solved, of the detections without a track that one of them begins."""
-PROBABLE = float(np.log(4))
-"""Log odds that a detection without a track must have to be taken."""
 TRACKED = 3.0
 """Log odds of a detection that continues a track being of its marker instead of clutter."""
 MAX_SHARED = 0.02
