@@ -116,24 +116,27 @@ class DistanceProfiles {
   }
 
   // Log density of the distances of one detection to others of its frame by the profile of a track,
-  // relative to an unknown marker, without those to its present track `own`. `at` is the point of
-  // each reference in the frame, null for none. Empty where too few steady distances are there.
-  std::optional<double> support(std::int32_t track, const Point& y,
-                                std::span<const Point* const> at, std::int32_t own) {
-    double sum = 0;
+  // relative to an unknown marker, without those to one other track. `at` is the index in `points`
+  // of each track in the frame, -1 for none. Empty where too few steady distances are there.
+  std::optional<double> support(std::int64_t track, const Point& y, std::span<const Point> points,
+                                std::span<const std::int32_t> at, std::int64_t without) {
+    double ratio = 1, sum = 0;
     std::size_t n = 0;
-    for (const auto& [spread, r] : steadiest(track)) {
-      if (at[r] == nullptr || references_[r] == own) continue;
-      const double off = std::sqrt(squared_distance(y, *at[r], all_.D)) - distance(track, r).median;
-      sum += log_t(off, spread) - log_t(off, std::hypot(spread, kUnknownSpread));
+    for (const Steady& own : steadiest(track)) {
+      const std::int32_t point = at[own.reference];
+      if (point < 0 || own.reference == without) continue;
+      const double off = std::sqrt(squared_distance(y, points[point], all_.D)) - own.median;
+      ratio *= (1 + off * off * own.per_unknown) / (1 + off * off * own.per_spread);
+      sum += own.log_ratio;
       if (++n == kNeighbours) break;
     }
     if (n < kMinNeighbours) return std::nullopt;
-    return sum / static_cast<double>(n);
+    return (sum + 2 * std::log(ratio)) / static_cast<double>(n);
   }
-  std::size_t n_references() const { return references_.size(); }
-  // The number of a track among the references, -1 for none.
-  std::int32_t reference_of(std::int64_t track) const { return reference_of_[track]; }
+  // No detection has a larger support in a track.
+  double max_support(std::int64_t track) {
+    return steadiest(track).empty() ? 0 : steadiest(track).front().log_ratio;
+  }
 
  private:
   static constexpr std::size_t kReferences = 128;  // longest tracks, to which distances are taken
@@ -296,16 +299,24 @@ class DistanceProfiles {
     if (own.median == kLater) own = learn(track, r, true);
     return own.is_known() && own.spread < kSteady ? &own : nullptr;
   }
+  // A steady distance, with what its density relative to an unknown marker needs.
+  struct Steady {
+    std::int32_t reference = 0;  // track
+    double median = 0, spread = 0, per_spread = 0, per_unknown = 0, log_ratio = 0;
+  };
   // The steady distances of a track, by rising spread.
-  const std::vector<std::pair<double, std::size_t>>& steadiest(std::int32_t track) {
+  const std::vector<Steady>& steadiest(std::int64_t track) {
     steadiest_.resize(profiles_.size());
-    if (!steadiest_[track]) {
-      steadiest_[track].emplace();
-      for (std::size_t r = 0; r < references_.size(); ++r)
-        if (const Distance* own = steady(track, r)) steadiest_[track]->push_back({own->spread, r});
-      std::ranges::sort(*steadiest_[track]);
-    }
-    return *steadiest_[track];
+    if (steadiest_[track]) return *steadiest_[track];
+    std::vector<Steady>& found = steadiest_[track].emplace();
+    for (std::size_t r = 0; r < references_.size(); ++r)
+      if (const Distance* own = steady(static_cast<std::int32_t>(track), r)) {
+        const double s2 = own->spread * own->spread, u2 = s2 + kUnknownSpread * kUnknownSpread;
+        found.push_back({references_[r], own->median, own->spread, 1 / (3 * s2), 1 / (3 * u2),
+                         std::log(u2 / s2) / 2});
+      }
+    std::ranges::stable_sort(found, {}, &Steady::spread);
+    return found;
   }
   Distance& kept(std::int32_t track, std::size_t r) {
     std::vector<Distance>& profile = profiles_[track];
@@ -378,7 +389,7 @@ class DistanceProfiles {
   std::vector<std::size_t> begin_;  // of each track in `samples_`
   std::vector<std::int32_t> at_;  // point of each reference in the sampled frames, -1 for none
   std::vector<std::vector<Distance>> profiles_;  // of each track, empty until it is needed
-  std::vector<std::optional<std::vector<std::pair<double, std::size_t>>>> steadiest_;
+  std::vector<std::optional<std::vector<Steady>>> steadiest_;
   std::vector<double> of_samples_;
   // Of the part that is compared.
   std::size_t n_measured_ = 0;

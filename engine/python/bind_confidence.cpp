@@ -10,6 +10,7 @@
 #include "confidence/distance_profiles.hpp"
 #include "confidence/exchanges.hpp"
 #include "confidence/frame_assignment.hpp"
+#include "confidence/run_exchanges.hpp"
 #include "python/arrays.hpp"
 #include "python/bindings.hpp"
 #include "python/motion_arrays.hpp"
@@ -171,7 +172,8 @@ class Profiles {
     return found.give({tracks.size(), n});
   }
 
-  // Assigns the open detections of one frame after the other, and returns the track of each.
+  // Assigns the open detections of one frame after the other, then exchanges pairs of tracks over
+  // runs of frames, and returns the track of each detection.
   Out<std::int64_t> assigned(const In<double>& points, const In<std::int64_t>& labels,
                              const In<std::int64_t>& offsets, const In<bool>& is_open,
                              const In<double>& ghost, const In<double>& sigma, double log_clutter,
@@ -193,7 +195,9 @@ class Profiles {
       nb::gil_scoped_release release;
       const OpenFrames all{at,          flat(offsets), open,    flat(ghost), flat(sigma),
                            log_clutter, change,        max_gap, D};
-      FrameAssignment(all, *profiles_, own).run();
+      AssignmentScore score(all, *profiles_, own);
+      FrameAssignment(score).run();
+      RunExchanges(score).run();
     }
     return array_of<std::int64_t>(own);
   }

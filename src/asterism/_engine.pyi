@@ -530,7 +530,7 @@ class DistanceProfiles:
     ) -> None: ...
     # Log density ratio of one marker against two, of pairs of tracks.
     def agreements(self, pairs: Ints) -> Floats: ...
-    # Track of each detection, the open ones of each frame assigned again.
+    # Track of each detection, the open ones assigned again and pairs of tracks exchanged.
     def assigned(
         self,
         points: Floats,

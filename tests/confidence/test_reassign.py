@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 import asterism as am
+from asterism import _engine
 from asterism.tracking.confidence.reassign import ghost_log_odds, reassigned
-from tests.scenes import moving
+from tests.references.reassignment import Reassignment
+from tests.scenes import moving, sized
 
 NOISE = 3e-4
 MIXED = slice(80, 100)
@@ -60,3 +62,53 @@ def test_independent_markers_stay_where_they_are():
     tracks = am.Tracks(detections=d, labels=labels)
     is_open = np.ones(len(labels), dtype=bool)
     np.testing.assert_array_equal(again(tracks, is_open), labels)
+
+
+def test_two_tracks_that_are_exchanged_over_runs_of_frames_return():
+    truth, _ = body()
+    labels = truth.labels.reshape(200, 8).copy()
+    for run in (slice(30, 31), slice(50, 53), slice(120, 160)):
+        labels[run, 1:3] = [2, 1]
+    tracks = am.Tracks(detections=truth.detections, labels=labels.ravel())
+    found = again(tracks, np.ones(labels.size, dtype=bool))
+    np.testing.assert_array_equal(found, truth.labels)
+
+
+def exchanged_at_random(rng, n=5, frames=9):
+    """A near-rigid body with missing detections and clutter, and exchanges over runs of frames."""
+    shape = rng.uniform(-0.15, 0.15, (n, 3))
+    t, positions = moving(shape, frames, int(rng.integers(99)), noise=0.003)
+    body = am.Tracks.from_dense(t, positions, tuple(map(str, range(n))))
+    labels = np.arange(n) * np.ones((frames, 1), dtype=int)
+    for _ in range(4):
+        begin, length = int(rng.integers(frames)), int(rng.integers(1, 6))
+        pair = rng.permutation(n)[:2]
+        labels[begin : begin + length, pair] = labels[begin : begin + length, pair[::-1]]
+    labels[rng.random(labels.shape) < 0.15] = -1
+    is_kept = (rng.random(labels.shape) > 0.1).ravel()
+    points, frame = body.detections.points[is_kept], body.detections.frame_of[is_kept]
+    return np.ascontiguousarray(points), frame.astype(np.int64), labels.ravel()[is_kept]
+
+
+def held_to_reference(seed):
+    """Return the number of changed labels, which are those of the reference implementation."""
+    rng = np.random.default_rng([seed, 31])
+    points, frame, labels = exchanged_at_random(rng)
+    n_tracks, n_frames = labels.max() + 1, frame.max() + 1
+    is_open, ghost = rng.random(len(labels)) < 0.9, rng.normal(0, 2, len(labels))
+    sigma = rng.uniform(0.002, 0.02, n_tracks)
+    offsets = np.searchsorted(frame, np.arange(n_frames + 1)).astype(np.int64)
+    engine = _engine.DistanceProfiles(
+        points, labels, offsets, np.arange(n_frames), n_tracks=n_tracks, noise=0.003
+    )
+    found = engine.assigned(
+        points, labels, offsets, is_open, ghost, sigma, log_clutter=-2.0, change=0.7, max_gap=3
+    )
+    reference = Reassignment(points, frame, labels, is_open, ghost, sigma, 0.003, -2.0, 0.7, 3)
+    np.testing.assert_array_equal(found, reference.assigned())
+    return int((found != labels).sum())
+
+
+def test_labels_are_those_of_the_reference():
+    n = sized(20, 3)
+    assert sum(held_to_reference(seed) for seed in range(n)) > 3 * n

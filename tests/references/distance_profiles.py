@@ -18,26 +18,12 @@ def compare_part(positions, noise, track, frames, partners):
     Returns whether the distances are known, the log density of an unknown marker, and up to three
     (log density, track), all relative to the own track.
     """
-    n_frames, n_tracks, _ = positions.shape
+    n_tracks = positions.shape[1]
     is_present = np.isfinite(positions[:, :, 0])
-    lengths = is_present.sum(axis=0)
-    references = sorted(range(n_tracks), key=lambda k: (-lengths[k], k))[:REFERENCES]
-    n_samples = min(SAMPLES, n_frames)
-    samples = [s * n_frames // n_samples for s in range(n_samples)]
+    references, samples = references_of(positions), samples_of(positions)
 
     def profile(k):
-        """Return the median and spread of the distance to each reference that has one."""
-        found = {}
-        for r in references:
-            both = [t for t in samples if is_present[t, k] and is_present[t, r]]
-            if r == k or len(both) < MIN_FRAMES:
-                continue
-            values = np.linalg.norm(positions[both, k] - positions[both, r], axis=1)
-            median = _upper_median(values)
-            spread = 1.4826 * _upper_median(abs(values - median))
-            floor = 2 * max(noise, MIN_NOISE) ** 2 + (BEND * median) ** 2
-            found[r] = median, np.sqrt(spread**2 + floor)
-        return found
+        return profile_of(positions, noise, k)
 
     n = min(len(frames), PART_FRAMES)
     used = [frames[i * (len(frames) - 1) // (n - 1)] if n > 1 else frames[0] for i in range(n)]
@@ -84,6 +70,51 @@ def compare_part(positions, noise, track, frames, partners):
         )
         others.append((float(density), k))
     return True, float(unknown), sorted(others, key=lambda one: (-one[0], one[1]))[:ALTERNATIVES]
+
+
+def references_of(positions):
+    """Return the longest tracks, to which distances are taken."""
+    lengths = np.isfinite(positions[:, :, 0]).sum(axis=0)
+    return sorted(range(len(lengths)), key=lambda k: (-lengths[k], k))[:REFERENCES]
+
+
+def samples_of(positions):
+    """Return the frames from which profiles are learnt."""
+    n = min(SAMPLES, len(positions))
+    return [s * len(positions) // n for s in range(n)]
+
+
+def profile_of(positions, noise, k):
+    """Return the median and spread of the distance of a track to each reference that has one."""
+    found, is_present = {}, np.isfinite(positions[:, :, 0])
+    for r in references_of(positions):
+        both = [t for t in samples_of(positions) if is_present[t, k] and is_present[t, r]]
+        if r == k or len(both) < MIN_FRAMES:
+            continue
+        values = np.linalg.norm(positions[both, k] - positions[both, r], axis=1)
+        median = _upper_median(values)
+        spread = 1.4826 * _upper_median(abs(values - median))
+        floor = 2 * max(noise, MIN_NOISE) ** 2 + (BEND * median) ** 2
+        found[r] = median, np.sqrt(spread**2 + floor)
+    return found
+
+
+def log_ratio_to_unknown(distances, profile):
+    """Return the log density of distances by a profile, relative to an unknown marker.
+
+    It is the mean over the steadiest ones, None where there are too few.
+    """
+    steady = sorted((s, i, r) for i, (r, (_, s)) in enumerate(profile.items()) if s < STEADY)
+    used = [r for _, _, r in steady if r in distances][:NEIGHBOURS]
+    if len(used) < MIN_NEIGHBOURS:
+        return None
+    off = {r: distances[r] - profile[r][0] for r in used}
+    return np.mean(
+        [
+            _log_t(off[r], profile[r][1]) - _log_t(off[r], np.hypot(profile[r][1], UNKNOWN_SPREAD))
+            for r in used
+        ]
+    )
 
 
 def _upper_median(values):

@@ -15,7 +15,7 @@ import numpy as np
 from asterism.records import record
 from asterism.tracking.confidence import assess
 from asterism.tracking.confidence.identity import OTHER_JOIN
-from asterism.tracking.confidence.reassign import UNCERTAIN, ghost_log_odds, reassigned
+from asterism.tracking.confidence.reassign import ghost_log_odds, reassigned
 from asterism.tracking.estimation import OVER_THREE_FRAMES, fit_body_motion, fit_to_tracks
 from asterism.tracking.lone import with_lone_detections
 from asterism.tracking.methods import GNN, METHODS, TOMHT, Rigidity, method_by_name, options_of
@@ -177,10 +177,10 @@ def most_certain(
     motion of `fit_body_motion`, and without, unless bonds are better or the first has some. That
     with bonds must be more certain by `DOUBTFUL`, because it uses distances as the confidence does.
     Then further passes follow (`next_pass`), until one is not more certain, and an attempt with the
-    motion in tracks of single frames. Every result is `refined_by_own_distances`. At the end the
-    uncertain detections of tracks with bonds are assigned once more, and tracks take lone
-    detections. For `progress`, the first method is half of the work, and every other attempt or
-    pass half of what is left.
+    motion in tracks of single frames. Every result is `refined_by_own_distances`. At the end all
+    detections of tracks with bonds are assigned once more, and tracks take lone detections. For
+    `progress`, the first method is half of the work, and every other attempt or pass half of what
+    is left.
 
     Parameters
     ----------
@@ -284,7 +284,7 @@ def _with_reason(best: Uncorrected, first: Uncorrected) -> Uncorrected:
 
 
 def _reassigned(found: Uncorrected) -> Uncorrected:
-    """Assign uncertain detections once more, while that makes more identities certain.
+    """Assign all detections once more, while that makes more identities certain.
 
     Only tracks made with bonds are changed, because distances decide. The confidence uses the same
     distances, so that it is too high afterwards to compare the result with another attempt.
@@ -293,10 +293,9 @@ def _reassigned(found: Uncorrected) -> Uncorrected:
     for _ in range(MAX_ROUNDS):
         if not best.is_doubtful or not _has_bonds(best.recipe):
             break
-        tracks, identity = best.assessed, best.assessed.identity_confidence
-        assert identity is not None
+        tracks = best.tracks
         labels = reassigned(
-            tracks, identity < UNCERTAIN, ghost_log_odds(tracks, best.stitching),
+            tracks, np.ones(len(tracks.labels), dtype=bool), ghost_log_odds(tracks, best.stitching),
             best.model.sensor.noise_sigma,
         )  # fmt: skip
         again = _with_labels(best, labels, int(tracks.info.get("refinements", 0)) + 1)

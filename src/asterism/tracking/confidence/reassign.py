@@ -1,4 +1,4 @@
-"""Assignment of the uncertain detections once more, given the distances that tracks keep."""
+"""Assignment of detections once more, given the distances that tracks keep."""
 
 from __future__ import annotations
 
@@ -19,9 +19,11 @@ if TYPE_CHECKING:
 __all__ = ["PROBABLE", "UNCERTAIN", "ghost_log_odds", "reassigned"]
 
 UNCERTAIN = 0.8
-"""Confidence of an identity below which a detection is assigned again."""
+"""Confidence of an identity below which a correction assigns a detection again."""
 PROBABLE = float(np.log(4))
-"""Log odds that a change must gain."""
+"""Log odds that a detection without a track must have to be taken."""
+CHANGE = 0.2
+"""Log odds that a change must gain, so that labels of equal odds do not alternate."""
 ROUNDS = 3
 """Largest number of times that all frames are assigned, each with the distances learnt anew."""
 REACH = 8
@@ -34,12 +36,14 @@ def reassigned(
     ghost: NDArray[np.float64],
     noise_sigma: float,
 ) -> NDArray[np.int64]:
-    """Assign the open detections to the tracks, frame by frame; all others stay.
+    """Assign the open detections to the tracks, frame by frame and pair by pair; all others stay.
 
-    Each frame has the assignment with the largest sum of log odds, given the labels of the others.
-    The log odds are those of the distances to the other tracks in the frame, against an unknown
-    marker, and of smooth motion between the frames around it, against clutter. A detection goes to
-    a track only by distances: one of independent markers stays where it is.
+    First each frame has the assignment with the largest sum of log odds, given the labels of the
+    others. Then each pair of tracks is exchanged in the most probable frames, given the other
+    tracks: two tracks that are exchanged over a run of frames fit each other there, so that no
+    single frame shows it. The log odds are those of the distances to the other tracks in the frame,
+    against an unknown marker, and of smooth motion between the frames around it, against clutter.
+    A detection goes to a track only by distances: one of independent markers stays where it is.
 
     Parameters
     ----------
@@ -65,8 +69,8 @@ def reassigned(
     for _ in range(ROUNDS):
         engine = learn_profiles(d, labels, noise_sigma).engine
         found = engine.assigned(
-            points, labels, offsets, is_open, ghost, sigma[: labels.max(initial=-1) + 1],
-            log_clutter=log_clutter, change=PROBABLE, max_gap=REACH,
+            points, labels, offsets, is_open, ghost + PROBABLE, sigma[: labels.max(initial=-1) + 1],
+            log_clutter=log_clutter, change=CHANGE, max_gap=REACH,
         )  # fmt: skip
         if np.array_equal(found, labels):
             break
