@@ -38,7 +38,7 @@ struct OpenFrames {
 };
 
 // Up to four detections of a track around a frame, and when they are, in frames from it.
-struct Neighbours {
+struct NearDetections {
   std::array<std::int32_t, 4> point{};
   std::array<double, 4> when{};
   std::size_t n = 0;
@@ -101,7 +101,7 @@ class AssignmentScore {
   double max_distances(std::int64_t k) { return kDistances * profiles_.max_support(k); }
 
   // Motion of a track between other detections of it.
-  SmoothMotion between(std::int64_t k, const Neighbours& around) const {
+  SmoothMotion between(std::int64_t k, const NearDetections& around) const {
     SmoothMotion found;
     if (around.n == 0) return found;
     double before = kNone, after = kNone;

@@ -66,8 +66,8 @@ class FrameAssignment {
   }
 
   // The nearest two detections of a track before and after a frame.
-  Neighbours around(std::int64_t t, std::int64_t k) const {
-    Neighbours found;
+  NearDetections around(std::int64_t t, std::int64_t k) const {
+    NearDetections found;
     for (const std::int64_t way : {-1, 1}) {
       const std::size_t most = found.n + 2;
       for (std::int64_t n = 1; n <= score_.all().max_gap && found.n < most; ++n) {

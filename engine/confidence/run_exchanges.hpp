@@ -126,7 +126,7 @@ class RunExchanges {
         return frames_[m].point[side ^ (window >> (n + 2 - m) & 1U)];
       };
       if (point(n) < 0) continue;
-      Neighbours around;
+      NearDetections around;
       for (std::size_t m = n < 2 ? 0 : n - 2; m < std::min(n + 3, frames_.size()); ++m) {
         const std::int64_t gap = frames_[m].t - frames_[n].t;
         if (m != n && point(m) >= 0 && std::abs(gap) <= score_.all().max_gap)

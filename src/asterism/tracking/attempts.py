@@ -286,12 +286,12 @@ def _with_reason(best: Uncorrected, first: Uncorrected) -> Uncorrected:
 def _reassigned(found: Uncorrected) -> Uncorrected:
     """Assign all detections once more, while that makes more identities certain.
 
-    Only tracks made with bonds are changed, because distances decide. The confidence uses the same
-    distances, so that it is too high afterwards to compare the result with another attempt.
+    The confidence uses the same distances, so that it is too high afterwards to compare the result
+    with another attempt.
     """
     best = found
     for _ in range(MAX_ROUNDS):
-        if not best.is_doubtful or not _has_bonds(best.recipe):
+        if not best.is_doubtful:
             break
         tracks = best.tracks
         labels = reassigned(

@@ -20,7 +20,7 @@ __all__ = ["PROBABLE", "UNCERTAIN", "ghost_log_odds", "reassigned"]
 
 UNCERTAIN = 0.8
 """Confidence of an identity below which a correction assigns a detection again."""
-PROBABLE = float(np.log(4))
+PROBABLE = float(np.log(20))
 """Log odds that a detection without a track must have to be taken."""
 CHANGE = 0.2
 """Log odds that a change must gain, so that labels of equal odds do not alternate."""
