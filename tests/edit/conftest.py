@@ -29,3 +29,12 @@ def served(folder):
     yield made
     if made.process.poll() is None:
         assert made.stop() == (0, "")
+
+
+@pytest.fixture
+def by_method(folder):
+    """A server of the capture tracked by one method, without the last assignment."""
+    made = Served(folder, "--method", "gnn")
+    yield made
+    if made.process.poll() is None:
+        assert made.stop() == (0, "")

@@ -36,8 +36,10 @@ def edits_of(served):
     return am.io.read_edits(served.folder / "trial.edits.toml", am.read(served.folder / CAPTURE))
 
 
-def session_of(served, path="trial.edits.toml"):
-    return am.edit.Session.open(am.read(served.folder / CAPTURE), served.folder / path)
+def session_of(served, method=None, path="trial.edits.toml"):
+    capture = am.read(served.folder / CAPTURE)
+    recipe = None if method is None else am.tracking.plan_tracking(capture, method).recipe
+    return am.edit.Session.open(capture, served.folder / path, recipe)
 
 
 def centre(page, selector):
@@ -131,7 +133,7 @@ def test_a_whole_session_by_keyboard(browser, served):
         page.key("z")
         on_disk(page, left)
     assert edits_of(served) == ()
-    assert_same_tracks(page, session_of(served, "none.toml"))
+    assert_same_tracks(page, session_of(served, path="none.toml"))
     for left in (1, 2, 3, 4, 5):
         page.key("y")
         on_disk(page, left)
@@ -156,7 +158,7 @@ def test_a_whole_session_by_pointer(browser, served):
     page.run("document.getElementById('track-subject').click()")
     press(page, "#fit")
     page.settle()
-    tracks = session_of(served, "none.toml").tracks
+    tracks = session_of(served, path="none.toml").tracks
     there = tracks.labels[tracks.detections.frame_of == 100]
     at = {k: page.run(f"asterism.where({k})") for k in there[there >= 0].tolist()}
 
@@ -211,7 +213,7 @@ def test_lasso_selects_what_it_surrounds(browser, served):
 
 def test_a_gap_is_previewed_and_filled(browser, served):
     page = opened(browser, served)
-    tracks = session_of(served, "none.toml").tracks
+    tracks = session_of(served, path="none.toml").tracks
     gap = max((g for g in tracks.gaps() if g.length < 30), key=lambda g: g.length)
     page.run(f"asterism.choose({gap.track}); asterism.seek({gap.first})")
     page.key("g")
@@ -228,7 +230,7 @@ def test_a_gap_is_previewed_and_filled(browser, served):
 
 def test_a_point_of_clutter_is_joined_by_keyboard(browser, served):
     page = opened(browser, served)
-    tracks = session_of(served, "none.toml").tracks
+    tracks = session_of(served, path="none.toml").tracks
     d = tracks.detections
     frame = int(d.frame_of[np.flatnonzero(tracks.labels < 0)[5]])
     absent = np.setdiff1d(np.arange(tracks.n_tracks), tracks.labels[d.frame_of == frame])
@@ -246,11 +248,11 @@ def test_a_point_of_clutter_is_joined_by_keyboard(browser, served):
 PREVIEW = "document.getElementById('filling').innerText"
 
 
-def test_an_assignment_of_all_points_is_previewed_and_confirmed(browser, served):
-    page = opened(browser, served)
+def test_an_assignment_of_all_points_is_previewed_and_confirmed(browser, by_method):
+    page = opened(browser, by_method)
     page.key("t")
     page.wait(f"{PREVIEW}.includes('would change')")
-    assert not (served.folder / "trial.edits.toml").exists()
+    assert not (by_method.folder / "trial.edits.toml").exists()
     n = int(page.run(PREVIEW).split("Assigned again, ")[1].split()[0])
     page.key("Escape")
     page.wait(f"{PREVIEW} === ''")
@@ -258,14 +260,14 @@ def test_an_assignment_of_all_points_is_previewed_and_confirmed(browser, served)
     page.wait(f"{PREVIEW}.includes('would change')")
     page.key("Enter")
     on_disk(page, 1)
-    assert [each.kind for each in edits_of(served)] == ["reassign"]
-    session = session_of(served)
+    assert [each.kind for each in edits_of(by_method)] == ["reassign"]
+    session = session_of(by_method, am.GNN())
     assert (session.tracks.labels != session.begun.tracks.labels).sum() == n
     assert_same_tracks(page, session)
     assert "Take back" in page.run("document.getElementById('changed').innerText")
     page.key("r")
     on_disk(page, 2)
-    assert_same_tracks(page, session_of(served))
+    assert_same_tracks(page, session_of(by_method, am.GNN()))
     page.close()
 
 

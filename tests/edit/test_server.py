@@ -47,20 +47,22 @@ def test_an_edit_is_on_disk_when_it_is_answered(served):
     assert served.post("redo")[0] == 409
 
 
-def test_an_assignment_is_on_disk_once_it_is_confirmed_and_not_before(served):
-    capture, path = am.read(served.folder / CAPTURE), served.folder / "trial.edits.toml"
-    status, preview = served.post("preview_reassign")
+def test_an_assignment_is_on_disk_once_it_is_confirmed_and_not_before(by_method):
+    capture, path = am.read(by_method.folder / CAPTURE), by_method.folder / "trial.edits.toml"
+    status, preview = by_method.post("preview_reassign")
     assert status == 200
     assert preview["stretches"]
     assert not path.exists()
-    status, answer = served.post("reassign")
+    status, answer = by_method.post("reassign")
     assert status == 200
     assert answer["stretches"] == preview["stretches"]
     (edit,) = am.io.read_edits(path, capture)
     assert edit.kind == "reassign"
-    session = am.edit.Session.open(capture, path)
+    session = am.edit.Session.open(
+        capture, path, am.tracking.plan_tracking(capture, am.GNN()).recipe
+    )
     assert session.tracks.labels[answer["detections"]].tolist() == answer["labels"]
-    assert served.post("edit", kind="reassign", detections=[0], name="")[0] != 200
+    assert by_method.post("edit", kind="reassign", detections=[0], name="")[0] != 200
 
 
 def test_contradictions_are_refused_and_change_nothing(served):
