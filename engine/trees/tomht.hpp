@@ -10,7 +10,6 @@
 #include <functional>
 #include <limits>
 #include <memory>
-#include <numeric>
 #include <span>
 #include <tuple>
 #include <utility>
@@ -18,6 +17,7 @@
 
 #include "solve/connected_components.hpp"
 #include "solve/set_packing.hpp"
+#include "trees/best_hypotheses.hpp"
 #include "trees/hypothesis_window.hpp"
 
 namespace asterism {
@@ -339,42 +339,12 @@ class HypothesisForest {
     }
   }
 
-  // The best hypotheses of a cluster: the option of each tree, and the log ratio of all.
-  struct Hypotheses {
-    std::vector<std::int32_t> chosen;
-    std::vector<double> totals;
-  };
-  // Those of a tree that shares no detection with another are its options.
-  Hypotheses hypotheses_of(std::span<const PackingOption> options) const {
-    Hypotheses out;
-    out.chosen.resize(options.size());
-    std::iota(out.chosen.begin(), out.chosen.end(), 0);
-    const auto weight = [&](std::int32_t o) { return options[o].log_weight; };
-    std::ranges::stable_sort(out.chosen, std::greater{}, weight);
-    const double least = weight(out.chosen.front()) - opt_.drop;
-    for (const std::int32_t o : out.chosen) {
-      if (weight(o) < least || static_cast<std::int64_t>(out.totals.size()) == opt_.max_hypotheses) break;
-      out.totals.push_back(weight(o));
-    }
-    return out;
-  }
-  Hypotheses hypotheses_of(const std::vector<std::int32_t>& cluster, TreeStats& stats) {
-    if (cluster.size() == 1) return hypotheses_of(s_.trees[cluster.front()].options);
+  BestHypotheses hypotheses_of(const std::vector<std::int32_t>& cluster, TreeStats& stats) {
+    if (cluster.size() == 1)
+      return best_options(s_.trees[cluster.front()].options, opt_.max_hypotheses, opt_.drop);
     std::vector<std::vector<PackingOption>> options;
     for (const std::int32_t i : cluster) options.push_back(std::move(s_.trees[i].options));
-    Hypotheses out;
-    const PackingSummary summary = SetPacking(options).solve(
-        opt_.max_hypotheses, opt_.drop, opt_.max_nodes,
-        [&](std::span<const std::int32_t> own, double log_ratio) {
-          out.chosen.insert(out.chosen.end(), own.begin(), own.end());
-          out.totals.push_back(log_ratio);
-        });
-    stats.n_nodes += summary.n_nodes;
-    if (!summary.is_exact && out.totals.size() == 1) {
-      ++stats.n_beams;
-      stats.gap = std::max(stats.gap, summary.bound - out.totals.front());
-    }
-    return out;
+    return best_packings(options, opt_.max_hypotheses, opt_.drop, opt_.max_nodes, stats);
   }
 
   void choose_in(const std::vector<std::int32_t>& cluster, TreeStats& stats) {

@@ -11,6 +11,7 @@ from asterism.model import Tracks
 from asterism.tracking.confidence.identity import assess
 from asterism.tracking.confidence.reassign import PROBABLE, UNCERTAIN, reassigned
 from asterism.tracking.correction.constraints import Constraints, detections_of
+from asterism.tracking.correction.continuation import continuation
 from asterism.tracking.correction.evidence import Evidence
 from asterism.tracking.correction.exchange import Lane, Motion, best_exchange
 from asterism.tracking.correction.settled import settled
@@ -33,11 +34,6 @@ TRACKED = 3.0
 """Log odds of a detection that continues a track being of its marker instead of clutter."""
 MAX_SHARED = 0.02
 """Largest share of the frames of a track that a track of the same marker may have too."""
-IDLE = 50
-"""Frames along a track after which no more detections without a track are looked for."""
-MIN_FIT = -40.0
-"""Smallest log likelihood, relative to straight motion, of a detection that continues another. It
-is far below that of a link of the tracker, which misses markers that accelerate."""
 
 
 class NoSolution(Exception):
@@ -317,7 +313,11 @@ class Solver:
         Where the track has a detection in the same frame, both may be exchanged.
         """
         labels, frame = self.labels, self._d.frame_of
-        chain = np.array(self._chain(detection, target))
+        chain = np.array(
+            continuation(
+                self._d, detection, target, labels, self._free(), self.evidence, self._motion
+            )
+        )
         is_taken = np.isin(frame[chain], frame[labels == target])
         labels[chain[~is_taken]] = target
         if labels[detection] != target:
@@ -364,43 +364,6 @@ class Solver:
         free[stated] = False
         ghosts = {int(parts[i]) for i in self._constraints.clutter} - {-1}
         return free & ~np.isin(parts, list(ghosts)) if ghosts else free
-
-    def _chain(self, detection: int, target: int) -> list[int]:
-        """Return the detections without a track that continue one of them to a track.
-
-        They fit by motion or, where the track has none, by its distances to other tracks.
-        """
-        d, labels, frame = self._d, self.labels, self._d.frame_of
-        free = self._free()
-        is_known = np.zeros(d.n_frames, dtype=bool)
-        is_known[frame[labels == target]] = True
-        t = int(frame[detection])
-        near = slice(d.offsets[max(t - IDLE, 0)], d.offsets[min(t + IDLE + 1, d.n_frames)])
-        own = np.arange(near.start, near.stop)[free[near] & ~is_known[frame[near]]]
-        odds = np.zeros(len(labels))
-        odds[own] = self.evidence.log_odds(own, labels, target)
-        chain = [detection]
-        for way in (1, -1):
-            before, head, newest = -1, detection, int(frame[detection])
-            t = newest + way
-            while (
-                0 <= t < d.n_frames
-                and abs(t - int(frame[head])) <= self._motion.max_gap
-                and abs(t - newest) <= IDLE
-            ):
-                own = np.arange(d.offsets[t], d.offsets[t + 1])
-                own = own[free[own] | (labels[own] == target)]
-                if len(own):
-                    fits = self._motion.continuation(before, head, own)
-                    fits = np.maximum(fits, MIN_FIT) + odds[own]
-                    best = int(np.argmax(fits))
-                    if fits[best] > MIN_FIT:
-                        before, head = head, int(own[best])
-                        if labels[head] < 0:
-                            chain.append(head)
-                            newest = t
-                t += way
-        return chain
 
 
 _Solution = tuple[float, list[tuple["NDArray[np.int64]", int]]]

@@ -231,7 +231,7 @@ def _sure_links(
     t = frame[chosen]
     following, distance = nearest.two(points[chosen], t + 1)
     clear = np.flatnonzero(distance[:, 0] < 0.3 * distance[:, 1])
-    # Other points of the frame must be as far as the second one of the next frame.
+    # The other points of the same frame must be clearly farther too.
     spacing = nearest.two(points[chosen[clear]], t[clear])[1][:, 1]
     clear = clear[distance[clear, 0] < 0.3 * spacing]
     next_one = following[clear, 0]

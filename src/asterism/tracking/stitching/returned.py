@@ -91,51 +91,53 @@ def returned(
     """
     order, offsets = tracks.by_track
     frames = tracks.detections.frame_of[order]
-    n = len(tracks.lengths)
-    first, last = np.full(n, np.iinfo(np.int64).max), np.full(n, -1)
-    used = np.flatnonzero(tracks.lengths)
-    first[used], last[used] = frames[offsets[used]], frames[offsets[used + 1] - 1]
-    follows = (last[:, None] >= 0) & (last[:, None] < first[None])
+    if not len(frames):
+        return []
+    first, last = frames[np.minimum(offsets[:-1], len(frames) - 1)], frames[offsets[1:] - 1]
+    is_long = tracks.lengths >= MIN_FRAMES
+    follows = is_long[:, None] & is_long & (last[:, None] < first)
     if max_occlusion is not None:
-        follows &= first[None] - last[:, None] - 1 <= max_occlusion
-    follows &= (tracks.lengths[:, None] >= MIN_FRAMES) & (tracks.lengths[None] >= MIN_FRAMES)
+        follows &= first - last[:, None] - 1 <= max_occlusion
     if min(follows.any(axis=1).sum(), follows.any(axis=0).sum()) < 3:
         return []
-    alike = _alike(_steady(tracks, follows, noise_sigma, steady), follows)
+    alike = _alike(_steady(tracks, first, last, follows, noise_sigma, steady), follows)
     bodies = _bodies(_supported(alike))
     markers = [sorted(own, key=lambda k: first[k]) for own in _clear(bodies, follows | follows.T)]
     return sorted(pair for own in markers for pair in pairwise(own))
 
 
 def _steady(
-    tracks: Tracks, follows: NDArray[np.bool_], noise_sigma: float, steady: float
+    tracks: Tracks,
+    first: NDArray[np.int64],
+    last: NDArray[np.int64],
+    follows: NDArray[np.bool_],
+    noise_sigma: float,
+    steady: float,
 ) -> _Steady:
     """Measure the distances of tracks that may be continued, or continue others."""
-    order, offsets = tracks.by_track
+    order, _ = tracks.by_track
     d = tracks.detections
-    key = tracks.labels[order] * d.n_frames + d.frame_of[order]  # rising from the first track on
-    key, order = key[offsets[0] :], order[offsets[0] :]
+    key = tracks.labels[order] * d.n_frames + d.frame_of[order]
     used = np.flatnonzero(follows.any(axis=0) | follows.any(axis=1))
-    first, last = (d.frame_of[order[offsets[used + side] - side - offsets[0]]] for side in (0, 1))
+    first, last = first[used], last[used]
     low, high = np.maximum(first[:, None], first), np.minimum(last[:, None], last)
     a, b = np.nonzero(np.triu(high - low + 1 >= MIN_FRAMES, 1))
     if len(a) > MAX_PAIRS:
         a = b = a[:0]
     low, high, a, b = low[a, b], high[a, b], used[a], used[b]
     at = low[:, None] + np.arange(SAMPLES) * (high - low + 1)[:, None] // SAMPLES
-    is_new = np.diff(at, axis=1, prepend=-1) > 0
-    where = [np.minimum(np.searchsorted(key, k[:, None] * d.n_frames + at), len(key) - 1)
-             for k in (a, b)]  # fmt: skip
-    seen = is_new
-    for k, found in zip((a, b), where, strict=True):
-        seen = seen & (key[found] == k[:, None] * d.n_frames + at)
-    n = seen.sum(axis=1)
-    distance = np.linalg.norm(d.points[order[where[0]]] - d.points[order[where[1]]], axis=2)
+    seen, rows = np.diff(at, axis=1, prepend=-1) > 0, []
+    for k in (a, b):
+        wanted = k[:, None] * d.n_frames + at
+        found = np.minimum(np.searchsorted(key, wanted), len(key) - 1)
+        seen &= key[found] == wanted
+        rows.append(order[found])
+    distance = np.linalg.norm(d.points[rows[0]] - d.points[rows[1]], axis=2)
     median = _median(distance, seen)
     spread = 1.4826 * _median(np.abs(distance - median[:, None]), seen)
     floor = 2 * max(noise_sigma, MIN_NOISE) ** 2 + (BEND * median) ** 2
     spread = np.sqrt(spread**2 + floor)
-    is_steady = (n >= MIN_FRAMES) & (spread < steady)
+    is_steady = (seen.sum(axis=1) >= MIN_FRAMES) & (spread < steady)
     return _Steady(np.stack([a, b], axis=1)[is_steady], median[is_steady], spread[is_steady])
 
 
@@ -152,7 +154,7 @@ def _alike(steady: _Steady, follows: NDArray[np.bool_]) -> dict[Pair, dict[Pair,
     -------
     dict
         For two pairs of an earlier and a later track, the log density ratio of the distances of the
-        earlier and of the later tracks being one, where it is at least `ALIKE`.
+        earlier and of the later tracks being one, where it exceeds `ALIKE`.
     """
     found: dict[Pair, dict[Pair, float]] = {}
     later = np.concatenate([steady.tracks, steady.tracks[:, ::-1]])

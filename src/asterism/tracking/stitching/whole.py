@@ -6,8 +6,7 @@ stable distances do, because body segments move almost rigidly.
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,21 +16,17 @@ from asterism.checks import check_kind, check_number
 from asterism.model import TrackingModel, Tracks
 from asterism.records import record
 from asterism.tracking.rigidity.bonds import Bonds, learn_bonds
-from asterism.tracking.stitching.agreement import agreeing
 from asterism.tracking.stitching.exchanged import exchanged_by_distances
-from asterism.tracking.stitching.passes import Pass, go_through
-from asterism.tracking.stitching.returned import STEADY, returned
+from asterism.tracking.stitching.joined import joined_by_distances
+from asterism.tracking.stitching.passes import go_through
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from asterism.model import Detections
 
 __all__ = ["Join", "Stitching", "check_options", "stitch", "stitch_options"]
 
 GHOST = -2
-AGREEING = 0.95
-"""Probability of a join by equal distances, as measured on simulated people."""
 
 
 @record
@@ -240,7 +235,7 @@ def stitch(
     found = go_through(d, found.tracklets, model, options, before=found, backward=True)
     options = stitch_options(*limits, may_cut=False)
     found = go_through(d, found.tracklets, model, options, before=found)
-    found = _joined_by_distances(d, found, model.sensor.noise_sigma, max_occlusion)
+    found = joined_by_distances(d, found, model.sensor.noise_sigma, max_occlusion)
     found = exchanged_by_distances(d, found, model)
     tracklets, markers, after = found.tracklets, found.markers, found.after
     # The last element is the label of clutter.
@@ -267,33 +262,6 @@ def stitch(
         tracks=result, tracklets=tracklets, markers=markers, after=after,
         probabilities=found.probabilities, cuts=cuts,
     )  # fmt: skip
-
-
-def _joined_by_distances(
-    d: Detections, found: Pass, noise_sigma: float, max_occlusion: int | None
-) -> Pass:
-    """Join tracks that keep the same distances, to others or as bodies among themselves."""
-    markers, after, probabilities = (
-        each.copy() for each in (found.markers, found.after, found.probabilities)
-    )
-    within, between = (partial(returned, steady=each) for each in STEADY)
-    for find in (agreeing, within, agreeing, between, agreeing):
-        labels = np.append(np.maximum(markers, -1), -1).astype(np.int64)[found.tracklets]
-        tracks = Tracks(detections=d, labels=labels)
-        joined: dict[int, int] = {}
-        for earlier, later in find(tracks, noise_sigma, max_occlusion):
-            while earlier in joined:
-                earlier = joined[earlier]
-            joined[later] = earlier
-            markers[markers == later] = earlier
-            own = np.flatnonzero(markers == earlier)  # tracklets are numbered by their start
-            is_new = after[own[1:]] != own[:-1]
-            after[own[1:]] = own[:-1]
-            probabilities[own[1:][is_new]] = AGREEING
-    used, numbers = np.unique(markers[markers >= 0], return_inverse=True)
-    if len(used) <= markers.max(initial=-1):
-        markers[markers >= 0] = numbers
-    return replace(found, markers=markers, after=after, probabilities=probabilities)
 
 
 def check_options(confirm: int, ghost_radius: float, max_occlusion: int | None) -> None:
