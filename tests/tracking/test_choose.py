@@ -156,6 +156,27 @@ def test_detections_of_a_doubtful_result_are_assigned_again(monkeypatch):
     assert after.expected_right > before.expected_right
     assert am.evaluate(after.tracks, truth).idf1 > am.evaluate(before.tracks, truth).idf1 + 0.005
     assert after.tracks.info["refinements"] > before.tracks.info.get("refinements", 0)
+    alone = dataclasses.replace(before, recipe=dataclasses.replace(before.recipe, options={}))
+    np.testing.assert_array_equal(_reassigned(alone).tracks.labels, after.tracks.labels)
+
+
+def test_ghosts_beside_the_markers_of_a_cube_are_left_alone(monkeypatch):
+    made, name = [], "asterism.tracking.attempts._reassigned"
+    monkeypatch.setattr(name, lambda found: made.append(found) or found)
+    truths = []
+    for seed in (51, 53, 54):
+        cube = am.simulate.cube(frames=400, seed=seed)
+        truths.append(
+            am.simulate.corrupt(
+                cube, burst=am.simulate.Burst(), ghosts=am.simulate.Ghosts(), noise=3e-4, seed=seed
+            )
+        )
+        am.track(truths[-1].detections)
+    monkeypatch.undo()
+    assert all(before.is_doubtful for before in made)
+    for before, truth in zip(made, truths, strict=True):
+        after = am.evaluate(_reassigned(before).tracks, truth).idf1
+        assert after > am.evaluate(before.tracks, truth).idf1 - 0.001
 
 
 def test_bonds_track_fast_motion_at_a_low_rate():
