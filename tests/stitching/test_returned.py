@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import importlib
 from itertools import chain, combinations, permutations
 
 import numpy as np
 import pytest
 
 import asterism as am
+from asterism.tracking.stitching.joined import joined_by_distances
+from asterism.tracking.stitching.passes import Pass
 from asterism.tracking.stitching.returned import ALIKE, STEADY, UNKNOWN, returned
 
 NOISE = 2e-4
@@ -86,6 +89,37 @@ def test_segments_of_a_person_come_back(seed):
     found = returned(am.Tracks(detections=d, labels=labels), NOISE)
     assert {later - earlier for earlier, later in found} == {53}
     assert len(found) >= 20
+
+
+def test_where_many_pairs_agree_few_are_kept(monkeypatch):
+    walk = am.simulate.person(frames=400, seed=3)
+    frame = walk.detections.frame_of
+    labels = np.where(frame < 150, walk.labels, np.where(frame < 260, -1, walk.labels + 53))
+    tracks = am.Tracks(detections=walk.detections, labels=labels)
+    name, sizes = "asterism.tracking.stitching.returned", []
+    bodies = importlib.import_module(name)._bodies
+    monkeypatch.setattr(f"{name}._bodies", lambda alike: sizes.append(len(alike)) or bodies(alike))
+    all_pairs = returned(tracks, NOISE)
+    monkeypatch.setattr(f"{name}.MANY", 0)
+    few = returned(tracks, NOISE)
+    assert sizes[1] < sizes[0] / 2
+    assert {later - earlier for earlier, later in few} == {53}
+    assert len(few) > len(all_pairs) - 10
+
+
+@pytest.mark.parametrize("order", [[0, 1, 2], [2, 1, 0], [1, 2, 0]])
+def test_all_visits_are_joined_to_one_marker(order):
+    """Whatever the order in which the visits are numbered."""
+    tracks = seen_in_turn(UNEVEN, UNEVEN, UNEVEN)
+    labels = (np.array(order)[tracks.labels // 5] * 5 + tracks.labels % 5).astype(np.int32)
+    found = Pass(
+        tracklets=labels, markers=np.arange(15, dtype=np.int32),
+        after=np.full(15, -1, dtype=np.int32), probabilities=np.ones(15),
+    )  # fmt: skip
+    joined = joined_by_distances(tracks.detections, found, NOISE, None)
+    assert len(np.unique(joined.markers)) == 5
+    np.testing.assert_array_equal(joined.markers[:5], joined.markers[5:10])
+    np.testing.assert_array_equal(joined.markers[:5], joined.markers[10:])
 
 
 def test_all_of_a_person_is_stitched():
