@@ -5,7 +5,6 @@ from __future__ import annotations
 import http.client
 import itertools
 import json
-import socket
 import threading
 from urllib.parse import parse_qs, urlparse
 
@@ -15,7 +14,7 @@ import pytest
 import asterism as am
 from asterism.errors import SinkError
 from asterism.live import LiveFrame, LiveRun, StreamHeader
-from asterism.live.sinks.page import PageSink, _listening
+from asterism.live.sinks.page import PageSink
 from asterism.live.sinks.parse import parse_sink
 from asterism.tracking import TrackStates
 from tests.reporting.browser import CHROMIUM, Browser
@@ -132,13 +131,6 @@ def test_the_port_is_for_this_machine_and_must_be_free(shown):
     with pytest.raises(am.ParameterError, match="this machine only"):
         parse_sink("page://0.0.0.0:8000")
     assert parse_sink("page://:8000").name == "page://:8000"
-
-
-def test_frames_do_not_wait_for_acknowledgements():
-    with _listening("page", 0) as listener, socket.create_connection(listener.getsockname()):
-        accepted, _ = listener.accept()
-        with accepted:
-            assert accepted.proto == socket.IPPROTO_TCP  # for which asyncio sets TCP_NODELAY
 
 
 def test_a_page_that_is_closed_ends_its_streams(shown):

@@ -11,7 +11,7 @@ import pytest
 import asterism as am
 from asterism.tracking.stitching.joined import joined_by_distances
 from asterism.tracking.stitching.passes import Pass
-from asterism.tracking.stitching.returned import ALIKE, STEADY, UNKNOWN, returned
+from asterism.tracking.stitching.returned import ALIKE, STEADY, UNKNOWN, _clear, returned
 
 NOISE = 2e-4
 SQUARE = [[0, 0, 0], [0.2, 0, 0], [0.2, 0.2, 0], [0, 0.2, 0]]
@@ -41,7 +41,7 @@ def test_it_may_come_back_often_and_with_fewer_markers():
     order = [3, 0, 4, 1]
     tracks = seen_in_turn(UNEVEN, [UNEVEN[k] for k in order], UNEVEN)
     expected = [(k, 5 + order.index(k)) if k in order else (k, k + 9) for k in range(5)]
-    expected += [(5 + at, 9 + k) for at, k in enumerate(order)]
+    expected += [(k, 9 + k) for k in order]
     assert returned(tracks, NOISE) == sorted(expected)
 
 
@@ -120,6 +120,19 @@ def test_all_visits_are_joined_to_one_marker(order):
     assert len(np.unique(joined.markers)) == 5
     np.testing.assert_array_equal(joined.markers[:5], joined.markers[5:10])
     np.testing.assert_array_equal(joined.markers[:5], joined.markers[10:])
+
+
+def test_a_marker_has_no_two_tracks_of_one_time():
+    """The third body would give the markers of the first tracks two tracks each."""
+    follows = np.ones((12, 12), dtype=bool)
+    follows[6:9, 9:] = follows[9:, 6:9] = False
+    bodies = {
+        ((0, 3), (1, 4), (2, 5)): 9.0,
+        ((3, 6), (4, 7), (5, 8)): 8.0,
+        ((0, 9), (1, 10), (2, 11)): 7.0,
+    }
+    found = _clear(bodies, follows)
+    assert sorted(map(sorted, found)) == [[0, 3, 6], [1, 4, 7], [2, 5, 8]]
 
 
 def test_all_of_a_person_is_stitched():

@@ -8,7 +8,6 @@ import json
 import os
 import secrets
 import signal
-import socket
 import threading
 from typing import TYPE_CHECKING, Any
 
@@ -16,8 +15,10 @@ from asterism.checks import check_extra
 from asterism.edit.messages import parsed
 from asterism.errors import AsterismError, ParameterError
 from asterism.reporting.guard import Guard
+from asterism.reporting.loopback import listening
 
 if TYPE_CHECKING:
+    import socket
     from collections.abc import AsyncGenerator, Callable, Generator
 
     from starlette.requests import Request
@@ -130,21 +131,12 @@ def serve(
         If the port is taken, or the packages of the server are missing.
     """
     check_extra("edit", "edit", "starlette", "uvicorn")
-    with contextlib.closing(_listening(port)) as listener:
-        asyncio.run(_serve(make_hub, listener, begin))
-
-
-def _listening(port: int) -> socket.socket:
-    # asyncio sends small messages at once only if the protocol of the listener is given.
-    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     try:
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.bind(("127.0.0.1", port))
-        listener.listen(128)
+        listener = listening(port)
     except OSError as error:
-        listener.close()
         raise ParameterError("--port", "a free port", f"{port}: {error.strerror}") from error
-    return listener
+    with listener:
+        asyncio.run(_serve(make_hub, listener, begin))
 
 
 async def _serve(

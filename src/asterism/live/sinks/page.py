@@ -8,7 +8,6 @@ import json
 import logging
 import math
 import secrets
-import socket
 import threading
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +16,7 @@ import numpy as np
 from asterism.checks import check_extra
 from asterism.errors import SinkError
 from asterism.reporting.guard import Guard
+from asterism.reporting.loopback import listening
 from asterism.reporting.page.stream import stream_page
 
 if TYPE_CHECKING:
@@ -92,7 +92,11 @@ class PageSink:
                 yield
 
         self._page = stream_page(header.source)
-        listener = _listening(self.name, self._port)
+        try:
+            listener = listening(self._port)
+        except OSError as error:
+            message = f"{self.name}: expected a free port, found {error.strerror}."
+            raise SinkError(message) from error
         port, token = listener.getsockname()[1], secrets.token_urlsafe(24)
         self._server = server = Server(
             uvicorn.Config(
@@ -171,20 +175,6 @@ class PageSink:
                 next_health = now + _HEALTH
                 yield json.dumps({"health": _health_of(run)}) + "\n"
             await asyncio.sleep(_PERIOD)
-
-
-def _listening(name: str, port: int) -> socket.socket:
-    # asyncio sends small packets at once only on sockets whose protocol is given; otherwise a frame
-    # waits up to 40 ms for the acknowledgement of the one before.
-    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP)
-    try:
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.bind(("127.0.0.1", port))
-        listener.listen(16)
-    except OSError as error:
-        listener.close()
-        raise SinkError(f"{name}: expected a free port, found {error.strerror}.") from error
-    return listener
 
 
 def _line_of(frame: LiveFrame) -> str:

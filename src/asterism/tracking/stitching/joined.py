@@ -49,11 +49,7 @@ def joined_by_distances(
         # The last element is the label of clutter.
         labels = np.append(np.maximum(markers, -1), -1).astype(np.int64)[found.tracklets]
         tracks = Tracks(detections=detections, labels=labels)
-        joined: dict[int, int] = {}
         for earlier, later in find(tracks, noise_sigma, max_occlusion):
-            while earlier in joined:
-                earlier = joined[earlier]
-            joined[later] = earlier
             markers[markers == later] = earlier
             own = np.flatnonzero(markers == earlier)  # tracklets are numbered by their start
             is_new = after[own[1:]] != own[:-1]

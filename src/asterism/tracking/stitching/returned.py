@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import combinations, pairwise
+from itertools import combinations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -87,7 +87,7 @@ def returned(
     Returns
     -------
     list of (int, int)
-        Each track that continues another, after the one that it continues.
+        The first track of a marker and a later one, for each later one.
     """
     order, offsets = tracks.by_track
     frames = tracks.detections.frame_of[order]
@@ -103,7 +103,7 @@ def returned(
     alike = _alike(_steady(tracks, first, last, follows, noise_sigma, steady), follows)
     bodies = _bodies(_supported(alike))
     markers = [sorted(own, key=lambda k: first[k]) for own in _clear(bodies, follows | follows.T)]
-    return sorted(pair for own in markers for pair in pairwise(own))
+    return sorted((own[0], later) for own in markers for later in own[1:])
 
 
 def _steady(
