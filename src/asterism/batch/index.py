@@ -137,7 +137,7 @@ def _row(out: str, job: Job, reason: str) -> dict[str, Any]:
         | {
             "state": "tracked",
             "expected_wrong": f"{values['expected_wrong']:.6g}",
-            "n_named": naming.get("n_named", ""),
+            "n_named": len({one["name"] for one in naming["names"]}) if naming else "",
             "n_filled": filled.get("n_filled", ""),
             "page": job.page or "",
             "input": job.source,

@@ -27,20 +27,19 @@ def naming_rows(found: Naming) -> list[tuple[str, str]]:
         ("names not found", ", ".join(found.missing) or "none"),
     ]
     rows += [] if found.own is None else _own_rows(found, found.own)
-    uncertain = sorted(
-        (float(p), str(name), other)
-        for p, name, other in zip(
-            found.probabilities, found.markers, found.alternatives, strict=True
-        )
-        if name is not None and p < UNCERTAIN
-    )
+    tracks = zip(found.probabilities, found.markers, found.alternatives, strict=True)
+    least: dict[str, tuple[float, str, str | None]] = {}  # by name, of all tracks with it
+    for p, name, other in tracks:
+        if name is not None and p < min(UNCERTAIN, least.get(name, (1.0,))[0]):
+            least[name] = float(p), name, other
+    uncertain = sorted(least.values())
     for n, (p, name, other) in enumerate(uncertain[:MOST]):
         rows.append(("" if n else f"below {UNCERTAIN:.0%}", f"{name} {p:.0%}, else {other}"))
     if len(uncertain) > MOST:
         rows.append(("", f"and {len(uncertain) - MOST} more"))
     at = _first_frame(found)
     for n, change in enumerate(found.changes[:MOST]):
-        text = f"track {change.track}, frames {at + change.first} to {at + change.last}: "
+        text = f"frames {at + change.first} to {at + change.last}: "
         text += f"{change.name or 'no name'} instead of {change.usual or 'no name'}"
         rows.append(("" if n else "changes of marker", text))
     if len(found.changes) > MOST:

@@ -143,7 +143,8 @@ def edit(
 
     serve(made, port=port or 0, begin=begin)
     if not (quiet or json):
-        print_table([("edits on disk", f"{len(session.edits)}, {path}")])
+        n = len(session.edits)
+        print_table([("edits on disk", f"{n}, {path}" if n else "none")])
 
 
 def _session(

@@ -271,7 +271,7 @@ def made_method(name: str | None, texts: list[str]) -> am.tracking.Method[Any] |
             hint = "give the method, such as --method smp"
             raise ParameterError("--option", expected, f"--method {am.tracking.AUTO}", hint)
         return None
-    check_fields("--method", [name], am.tracking.METHODS)
+    check_fields("--method", [name], [am.tracking.AUTO, *am.tracking.METHODS])
     known = record_options(am.tracking.METHODS[name])
     given = parsed("--option", f"method {name}", texts, known)
     with as_options({option: f"--option {option}" for option in given}):
