@@ -53,14 +53,6 @@ void bind_options(nb::module_& module) {
       .value("tracks_propose", Pairing::tracks_propose)
       .value("detections_propose", Pairing::detections_propose);
 
-  nb::class_<StepResult>(module, "StepResult")
-      .def_ro("tracker", &StepResult::tracker)
-      .def_ro("labels", &StepResult::labels)
-      .def_ro("confidence", &StepResult::confidence)
-      .def_ro("revised", &StepResult::revised)
-      .def_ro("revised_labels", &StepResult::revised_labels)
-      .def_ro("revised_confidence", &StepResult::revised_confidence)
-      .def_ro("stats", &StepResult::stats);
 
   nb::exception<CandidateLimit>(module, "CandidateLimit");
 }

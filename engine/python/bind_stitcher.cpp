@@ -58,13 +58,13 @@ nb::tuple finish_stitcher(StitcherPass& pass) {
                         array_of<double>(pass.decisions, &Decision::probability));
 }
 
-// Processes one frame of a stream on a copy: (new state, markers, earlier detections whose marker
-// changes, their markers).
-nb::tuple step_stitcher(const LiveStitcher& before, const In<double>& F, const In<double>& Q,
+// Processes one frame of a stream in place: (markers, earlier detections whose marker changes, their
+// markers).
+nb::tuple step_stitcher(LiveStitcher& stitcher, const In<double>& F, const In<double>& Q,
                         const In<double>& points, const In<std::int64_t>& labels,
                         const In<std::int64_t>& revised, const In<std::int64_t>& revised_labels) {
-  const MotionStep step = motion_step(before.motion(), F, Q);
-  const std::vector<Point> frame = to_points(points, before.motion().axis.D);
+  const MotionStep step = motion_step(stitcher.motion(), F, Q);
+  const std::vector<Point> frame = to_points(points, stitcher.motion().axis.D);
   require(labels.ndim() == 1 && labels.size() == frame.size(), "labels: one for each point");
   require(revised.ndim() == 1 && revised_labels.ndim() == 1 &&
               revised.size() == revised_labels.size(),
@@ -73,22 +73,21 @@ nb::tuple step_stitcher(const LiveStitcher& before, const In<double>& F, const I
   std::vector<Change> changes(revised.size()), reported;
   for (std::size_t i = 0; i < changes.size(); ++i) {
     changes[i] = {revised.data()[i], revised_labels.data()[i]};
-    require(changes[i].first >= 0 && changes[i].first < before.n_seen(),
+    require(changes[i].first >= 0 && changes[i].first < stitcher.n_seen(),
             "revised: detections of earlier frames");
   }
-  LiveStitcher after(before);
   std::vector<std::int64_t> own(frame.size());
   {
     nb::gil_scoped_release release;
-    const std::int64_t first = before.n_seen();
-    after.step(step, frame, flat(labels), changes, [&](std::int64_t detection, std::int64_t marker) {
+    const std::int64_t first = stitcher.n_seen();
+    stitcher.step(step, frame, flat(labels), changes, [&](std::int64_t detection, std::int64_t marker) {
       if (detection < first)
         reported.emplace_back(detection, marker);
       else
         own[detection - first] = marker;
     });
   }
-  return nb::make_tuple(std::move(after), array_of<std::int64_t>(own),
+  return nb::make_tuple(array_of<std::int64_t>(own),
                         array_of<std::int64_t>(reported, &Change::first),
                         array_of<std::int64_t>(reported, &Change::second));
 }
@@ -253,7 +252,8 @@ Out<std::int32_t> decide_jointly(const In<double>& centers, const In<double>& tr
 }
 
 nb::tuple bonds_of(const Neighbours& neighbours, std::int32_t marker) {
-  const std::span<const Bond> bonds = neighbours.of(marker);
+  std::vector<Bond> bonds;
+  for (const Bond& bond : neighbours.of(marker)) bonds.push_back(bond);
   return nb::make_tuple(
       array_of<std::int64_t>(bonds, &Bond::other), array_of<std::int64_t>(bonds, &Bond::n),
       array_of<double>(bonds, &Bond::mean), array_of<double>(bonds, &Bond::variance),
@@ -343,6 +343,7 @@ void bind_stitcher(nb::module_& module) {
            "options"_a, nb::kw_only(), "lag"_a)
       .def("step", &step_stitcher, "F"_a, "Q"_a, "points"_a, "labels"_a, "revised"_a,
            "revised_labels"_a)
+      .def("copy", [](const LiveStitcher& self) { return LiveStitcher(self); })
       .def("states", &marker_states, "labels"_a, "gaps"_a, "log_odds"_a, "means"_a,
            "covariances"_a)
       .def_prop_ro("n_seen", &LiveStitcher::n_seen)

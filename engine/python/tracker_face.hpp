@@ -1,4 +1,4 @@
-// The interface of every tracker to Python: one frame on a copy, many frames in place, the tracks.
+// The interface of every tracker to Python: one frame or many in place, a copy, the tracks.
 #pragma once
 
 #include <algorithm>
@@ -40,52 +40,39 @@ Labeller labeller(const Tracker& tracker, Labels labels, Confidence confidence, 
   };
 }
 
-// The decisions of one frame, processed on a copy of the tracker. Without confidence its arrays are
-// empty.
-struct StepResult {
-  nb::object tracker;  // the copy, after the frame
-  nb::object labels, confidence;
-  nb::object revised, revised_labels, revised_confidence;  // earlier detections whose label changes
-  nb::object stats;
-};
-
+// Processes a frame and returns its decisions: labels and confidence, earlier detections whose label
+// changes with their labels and confidence, and counts. A confidence that the tracker does not provide
+// is None.
 template <typename Tracker>
-StepResult step(const Tracker& before, double time, const In<double>& F, const In<double>& Q,
+nb::tuple step(Tracker& tracker, double time, const In<double>& F, const In<double>& Q,
                const In<double>& points) {
-  const std::vector<Point> frame = to_points(points, before.motion().axis.D);
-  const MotionStep motion = motion_step(before.motion(), F, Q);
-  Tracker after(before);
+  const std::vector<Point> frame = to_points(points, tracker.motion().axis.D);
+  const MotionStep motion = motion_step(tracker.motion(), F, Q);
   struct Revision {
     std::int64_t detection, id = -1;
     double confidence = 0;
   };
   std::vector<Revision> now(frame.size()), revised;
-  const std::int64_t first = before.so_far().n_seen;
+  const std::int64_t first = tracker.so_far().n_seen;
   const Labeller label = [&](std::int64_t detection, std::int64_t id, double p) {
     if (detection < first)
       revised.push_back({detection, id, p});
     else
       now[detection - first] = {detection, id, p};
   };
-  std::decay_t<decltype(before.total())> stats;
+  std::decay_t<decltype(tracker.total())> stats;
   {
     nb::gil_scoped_release release;
-    stats = after.step(time, motion, frame, label);
+    stats = tracker.step(time, motion, frame, label);
   }
   const auto ids = [](const auto& all) { return nb::cast(array_of<std::int64_t>(all, &Revision::id)); };
-  const auto sure = [&](std::vector<Revision>& all) {
-    if (!before.has_confidence()) all.clear();
+  const auto sure = [&](const std::vector<Revision>& all) -> nb::object {
+    if (!tracker.has_confidence()) return nb::none();
     return nb::cast(array_of<double>(all, &Revision::confidence));
   };
-  StepResult out;
-  out.tracker = nb::cast(std::move(after));
-  out.labels = ids(now);
-  out.confidence = sure(now);
-  out.revised = nb::cast(array_of<std::int64_t>(revised, &Revision::detection));
-  out.revised_labels = ids(revised);
-  out.revised_confidence = sure(revised);
-  out.stats = nb::cast(std::move(stats));
-  return out;
+  return nb::make_tuple(ids(now), sure(now),
+                        nb::cast(array_of<std::int64_t>(revised, &Revision::detection)),
+                        ids(revised), sure(revised), std::move(stats));
 }
 
 // Processes many frames in place.

@@ -85,7 +85,7 @@ class Carrier {
     accuracy_.erase(marker);
   }
 
-  std::span<const Bond> neighbours(std::int32_t marker) const { return neighbours_.of(marker); }
+  auto neighbours(std::int32_t marker) const { return neighbours_.of(marker); }
   // Pairs of positions of the marker's most stable neighbours that are detected in both frames.
   template <typename Then, typename Now>
   std::span<const RigidPair> pair(std::int32_t marker, const Then& then, const Now& now) {
@@ -211,7 +211,7 @@ class RigidCarrier {
   bool carry(std::int32_t marker, const Places& now, Carriage& out, std::int64_t n_open = 0);
 
   // All distances known of a marker, whether they are bonds or not.
-  std::span<const Bond> distances(std::int32_t marker) const { return carrier_.neighbours(marker); }
+  auto distances(std::int32_t marker) const { return carrier_.neighbours(marker); }
   // The number of bonds of a marker to markers of larger number, so that each pair is counted once.
   std::int64_t n_bonds(std::int32_t marker) const;
 

@@ -5,7 +5,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -17,7 +16,7 @@
 #include "base/scratch.hpp"
 #include "base/shared_copy.hpp"
 #include "filter/kalman.hpp"
-#include "rigid/bond.hpp"
+#include "rigid/marker_bonds.hpp"
 
 namespace asterism {
 
@@ -109,108 +108,65 @@ class Neighbours {
     places_.reserve(seen.size());
     for (const MarkerPoint& one : seen) places_.set(one.marker, one.at);
     for (const MarkerPoint& one : seen) {
-      SharedCopy<Bonds>& shared = bonds_[one.marker];
-      if (!shared.has_value()) shared = SharedCopy<Bonds>(Bonds{});
-      Bonds& bonds = shared.own();
+      SharedCopy<MarkerBonds>& shared = bonds_[one.marker];
+      if (!shared.has_value()) shared = SharedCopy<MarkerBonds>(MarkerBonds{});
+      MarkerBonds& bonds = shared.own();
       if (bonds.size() == 0 || (n_frames_ + one.marker) % kLookEvery == 0) look_around(seen, one, bonds);
-      Variances variances;
-      for (std::size_t k = 0; k < bonds.size(); ++k) {
-        if (const Point* other = places_.find(bonds[k].other))
-          bonds[k].add(std::sqrt(squared_distance(one.at, *other)));
-        variances[k] = variance(bonds[k]);
-      }
-      sort(bonds, variances);
+      bonds.update(r_, [&](std::int32_t other) {
+        const Point* at = places_.find(other);
+        return at == nullptr ? -1.0 : squared_distance(one.at, *at);
+      });
     }
   }
 
   // Removes a marker that will not be detected again.
   void forget(std::int32_t marker) {
     bonds_.erase(marker);
-    const auto is_gone = [&](const Bond& bond) { return bond.other == marker; };
     for (auto& [own, bonds] : bonds_)
-      if (std::ranges::any_of(bonds->span(), is_gone)) bonds.own().remove_if(is_gone);
+      if (bonds->contains(marker)) bonds.own().remove(marker);
   }
 
   // The bonds of a marker, by increasing variance and then by the number of the other marker.
-  std::span<const Bond> of(std::int32_t marker) const {
-    const SharedCopy<Bonds>* bonds = bonds_.find(marker);
-    if (bonds == nullptr) return {};
-    return (*bonds)->span();
+  auto of(std::int32_t marker) const {
+    static const MarkerBonds kNone;
+    const SharedCopy<MarkerBonds>* bonds = bonds_.find(marker);
+    return (bonds == nullptr ? kNone : **bonds).all();
   }
   double variance(const Bond& bond) const { return predictive_variance(bond, r_); }
 
  private:
   static constexpr std::int64_t kLookEvery = 32;  // frames
-  static constexpr std::size_t kMaxNeighbours = 24, kNearest = 12;
+  static constexpr std::size_t kNearest = 12;
   static constexpr std::int64_t kTrial = 60;  // frames before a neighbour may be replaced
-
-  // The bonds of a marker, in one piece of memory, because the next state of a stream clones them.
-  class Bonds {
-   public:
-    std::span<const Bond> span() const { return {all_.data(), n_}; }
-    std::span<Bond> span() { return {all_.data(), n_}; }
-    std::size_t size() const { return n_; }
-    Bond& operator[](std::size_t k) { return all_[k]; }
-    void add(const Bond& bond) { all_[n_++] = bond; }
-    template <typename IsGone>
-    void remove_if(IsGone&& is_gone) {
-      n_ -= std::ranges::remove_if(span(), is_gone).size();
-    }
-
-   private:
-    std::array<Bond, kMaxNeighbours> all_{};
-    std::size_t n_ = 0;
-  };
-
-  using Variances = std::array<double, kMaxNeighbours>;
-
-  // Variances change little from frame to frame, so an insertion sort is fast.
-  static void sort(Bonds& bonds, Variances& variances) {
-    for (std::size_t k = 1; k < bonds.size(); ++k) {
-      const auto is_before = [&](double own, std::int32_t other, std::size_t at) {
-        return own < variances[at] || (own == variances[at] && other < bonds[at].other);
-      };
-      if (!is_before(variances[k], bonds[k].other, k - 1)) continue;
-      const Bond bond = bonds[k];
-      const double own = variances[k];
-      std::size_t at = k;
-      for (; at > 0 && is_before(own, bond.other, at - 1); --at) {
-        bonds[at] = bonds[at - 1];
-        variances[at] = variances[at - 1];
-      }
-      bonds[at] = bond;
-      variances[at] = own;
-    }
-  }
 
   // Adds the nearest markers as neighbours. If the list is full, a new one replaces the neighbour
   // with the largest variance.
-  void look_around(std::span<const MarkerPoint> seen, const MarkerPoint& one,
-                   Bonds& bonds) {
+  void look_around(std::span<const MarkerPoint> seen, const MarkerPoint& one, MarkerBonds& bonds) {
     near_.clear();
     for (const MarkerPoint& other : seen)
       if (other.marker != one.marker)
         near_.push_back({squared_distance(one.at, other.at), other.marker});
-    const std::size_t n = std::min(bonds.size() == 0 ? kMaxNeighbours : kNearest, near_.size());
+    const std::size_t n = std::min(bonds.size() == 0 ? MarkerBonds::kMost : kNearest, near_.size());
     std::partial_sort(near_.begin(), near_.begin() + static_cast<std::ptrdiff_t>(n), near_.end());
-    for (std::size_t k = 0; k < n; ++k) {
-      const std::int32_t other = near_[k].second;
-      if (std::ranges::any_of(bonds.span(), [&](const Bond& b) { return b.other == other; }))
-        continue;
-      if (bonds.size() < kMaxNeighbours) {
-        bonds.add({other});
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto [squared, other] = near_[i];
+      if (bonds.contains(other)) continue;
+      if (bonds.size() < MarkerBonds::kMost) {
+        bonds.add(other);
         continue;
       }
-      const auto worst = std::ranges::max_element(
-          bonds.span(), {}, [&](const Bond& bond) { return variance(bond); });
-      if (worst->n >= kTrial && worst->mean * worst->mean > near_[k].first) *worst = {other};
+      std::size_t worst = 0;
+      for (std::size_t k = 1; k < bonds.size(); ++k)
+        if (variance(bonds[k]) > variance(bonds[worst])) worst = k;
+      const Bond bond = bonds[worst];
+      if (bond.n >= kTrial && bond.mean * bond.mean > squared) bonds.replace(worst, other);
     }
   }
 
   int D_;
   double r_;
   std::int64_t n_frames_ = 0;
-  FlatMap<std::int32_t, SharedCopy<Bonds>> bonds_;  // copies share those of markers not detected
+  FlatMap<std::int32_t, SharedCopy<MarkerBonds>> bonds_;  // copies share those of markers not detected
   Scratch<Places> places_;
   std::vector<std::pair<double, std::int32_t>> near_;
 };

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from enum import Enum
-from typing import Any, Final, Generic, Self, TypeAlias, TypeVar
+from typing import Any, Final, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -138,20 +138,13 @@ class LifeOptions:
         self, *, gate: float, confirm_score: float, delete_drop: float, max_candidates: int
     ) -> None: ...
 
-_T = TypeVar("_T")
-
-class StepResult(Generic[_T]):
-    tracker: Final[_T]
-    labels: Final[Ints]
-    confidence: Final[Floats]
-    revised: Final[Ints]
-    revised_labels: Final[Ints]
-    revised_confidence: Final[Floats]
-    stats: Final[FrameStats]
-
 # What all trackers have; there is no such class in the module.
 class _Tracker:
-    def step(self, time: float, F: Floats, Q: Floats, points: Floats) -> StepResult[Self]: ...
+    # (labels, confidence, earlier detections whose label changes, their labels, their confidence,
+    # counts); a confidence is None if the tracker provides none
+    def step(
+        self, time: float, F: Floats, Q: Floats, points: Floats
+    ) -> tuple[Ints, Floats | None, Ints, Ints, Floats | None, FrameStats]: ...
     def run(
         self,
         times: Floats,
@@ -601,7 +594,7 @@ class Stitcher:
 
 class LiveStitcher:
     def __init__(self, motion: MotionModel, options: StitchOptions, *, lag: int) -> None: ...
-    # (new state, markers, earlier detections whose marker changes, their markers)
+    # (markers, earlier detections whose marker changes, their markers)
     def step(
         self,
         F: Floats,
@@ -610,7 +603,8 @@ class LiveStitcher:
         labels: Ints,
         revised: Ints,
         revised_labels: Ints,
-    ) -> tuple[LiveStitcher, Ints, Ints, Ints]: ...
+    ) -> tuple[Ints, Ints, Ints]: ...
+    def copy(self) -> LiveStitcher: ...
     # As `tracks` of a tracker, of the markers, from that of the tracker of the labels.
     def states(
         self, labels: Ints, gaps: Ints, log_odds: Floats, means: Floats, covariances: Floats

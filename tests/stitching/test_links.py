@@ -152,7 +152,7 @@ def stream(dense, *, lag=2, confirm=15, revise=None, labels=None):
         seen = np.isfinite(points[:, 0])
         own = np.flatnonzero(seen) if labels is None else labels[t][seen]
         which, new = np.array((revise or {}).get(t, []), dtype=np.int64).reshape(-1, 2).T
-        live, markers, changed, now = live.step(
+        markers, changed, now = live.step(
             F, Q, points[seen], own, np.ascontiguousarray(which), np.ascontiguousarray(new)
         )
         first = len(final)

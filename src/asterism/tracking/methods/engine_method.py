@@ -193,32 +193,32 @@ class EngineMethod(Method[EngineState]):
         from asterism.model.compiled import no_transition, transition, with_noise
 
         check_kind("state", state, EngineState, "method.init(model)")
-        before = state.tracker
-        frame = checked_frame(time, before.last_time, points, state.n_axes)
+        tracker = state.tracker.copy()
+        self._check(state, time, points)
+        frame = checked_frame(time, tracker.last_time, points, state.n_axes)
         if covariances is not None:
             frame = with_noise(frame, checked_covariances(covariances, frame))
         # The first frame has no step before it and no tracks, so no transition is needed.
-        dt = time - before.last_time if before.n_frames else None
+        dt = time - tracker.last_time if tracker.n_frames else None
         motion = state.model.motion
         F, Q = transition(motion, dt) if dt else no_transition(motion)
         try:
-            found = before.step(time, F, Q, frame)
+            labels, sure, revised, revised_labels, revised_sure, stats = tracker.step(
+                time, F, Q, frame
+            )
         except (_engine.CandidateLimit, _engine.FrontierLimit) as error:
             raise _too_many(error) from error
-        has_confidence = before.has_confidence
-        update = Update(
-            labels=found.labels,
-            revised=found.revised,
-            revised_labels=found.revised_labels,
-            confidence=found.confidence if has_confidence else None,
-            revised_confidence=found.revised_confidence if has_confidence else None,
-            info=self._about(found.stats),
-            read_tracks=partial(_tracks_of, found.tracker),
-        )
         after = EngineState(
-            model=state.model, n_axes=state.n_axes, tracker=found.tracker, about=state.about
+            model=state.model, n_axes=state.n_axes, tracker=tracker, about=state.about
         )
-        return after, update
+        return after, Update(
+            labels=labels, revised=revised, revised_labels=revised_labels, confidence=sure,
+            revised_confidence=revised_sure, info=self._about(stats),
+            read_tracks=partial(_tracks_of, tracker),
+        )  # fmt: skip
+
+    def _check(self, state: EngineState, time: float, points: ArrayLike) -> None:
+        """Raise if the method cannot take the frame."""
 
     def run(
         self,

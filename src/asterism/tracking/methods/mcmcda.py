@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
     from asterism import _engine
     from asterism.model import Detections, TrackingModel
-    from asterism.tracking.methods.base import Update
     from asterism.tracking.methods.engine_method import Tracker
 
 __all__ = ["MCMCDA"]
@@ -260,35 +259,11 @@ class MCMCDA(EngineMethod):
             _own(state).start_from(labels)
         return state
 
-    def step(
-        self,
-        state: EngineState,
-        time: float,
-        points: ArrayLike,
-        *,
-        covariances: ArrayLike | None = None,
-    ) -> tuple[EngineState, Update]:
-        """Process the next frame.
-
-        Parameters
-        ----------
-        state, time, points, covariances
-            As for `Method.step`.
-
-        Returns
-        -------
-        state, update
-            Next state, and the labels decided by the frame.
-
-        Raises
-        ------
-        ParameterError
-            If the method has no window, or as for `Method.step`.
-        """
+    def _check(self, state: EngineState, time: float, points: ArrayLike) -> None:
+        del state, time, points
         if self.window is None:
             hint = "window=None is for whole captures, by run"
             raise ParameterError("window", "a number of frames", "None", hint)
-        return super().step(state, time, points, covariances=covariances)
 
     def run(
         self,

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
     from asterism import _engine
     from asterism.model import Detections, TrackingModel
-    from asterism.tracking.methods.base import Update
     from asterism.tracking.methods.engine_method import EngineState
 
 __all__ = ["SMP"]
@@ -148,34 +147,9 @@ class SMP(EngineMethod):
     def _about(self, stats: _engine.FrameStats) -> dict[str, float]:
         return shared_counts(self, stats)
 
-    def step(
-        self,
-        state: EngineState,
-        time: float,
-        points: ArrayLike,
-        *,
-        covariances: ArrayLike | None = None,
-    ) -> tuple[EngineState, Update]:
-        """Process the next frame.
-
-        Parameters
-        ----------
-        state, time, points, covariances
-            As for `Method.step`.
-
-        Returns
-        -------
-        state, update
-            Next state, and the labels decided by the frame.
-
-        Raises
-        ------
-        ParameterError
-            If `strict` is set and the number of points differs from that of the first frame.
-        """
+    def _check(self, state: EngineState, time: float, points: ArrayLike) -> None:
         if self.strict and state.tracker.n_frames:
             _check_number(len(np.asarray(points)), state.n_ids, f"in the frame at {time:g} s")
-        return super().step(state, time, points, covariances=covariances)
 
     def run(
         self,

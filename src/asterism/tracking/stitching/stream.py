@@ -192,7 +192,8 @@ class Stitched(Method[StitchedState]):
         tracklets, found = self.method.step(state.tracklets, time, frame, covariances=covariances)
         motion, dt = state.model.motion, time - state.last_time
         F, Q = no_transition(motion) if dt == float("inf") else transition(motion, dt)
-        stitcher, labels, revised, revised_labels = state.stitcher.step(
+        stitcher = state.stitcher.copy()
+        labels, revised, revised_labels = stitcher.step(
             F, Q, frame, found.labels, found.revised, found.revised_labels
         )
         after = StitchedState(
