@@ -227,11 +227,13 @@ export class Timeline {
   }
 }
 
+// Names of one segment often differ at their end alone, so the middle is left out.
 function shortened(pen, text, room) {
+  const without = (n) => `${text.slice(0, Math.floor(n / 3))}…${text.slice(Math.floor(n / 3) - n)}`;
   if (pen.measureText(text).width <= room) return text;
   let n = Math.min(text.length, 40);
-  while (n > 1 && pen.measureText(`${text.slice(0, n)}…`).width > room) n--;
-  return `${text.slice(0, n)}…`;
+  while (n > 2 && pen.measureText(without(n)).width > room) n--;
+  return without(n);
 }
 
 function roundStep(size) {
