@@ -14,8 +14,8 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <numbers>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -59,7 +59,8 @@ class AssignmentScore {
  public:
   AssignmentScore(const OpenFrames& all, DistanceProfiles& profiles, std::span<std::int64_t> labels)
       : all_(all), profiles_(profiles), labels_(labels), first_(n_tracks(), n_frames()),
-        last_(n_tracks(), -1), at_(n_frames() * n_tracks(), -1) {
+        last_(n_tracks(), -1), at_(n_frames() * n_tracks(), -1),
+        own_(labels.size()), reach_(labels.size(), kLater) {
     for (std::int64_t t = 0; t < n_frames(); ++t)
       for (std::int64_t i = all.offsets[t]; i < all.offsets[t + 1]; ++i)
         if (const std::int64_t k = labels[i]; k >= 0) {
@@ -83,20 +84,32 @@ class AssignmentScore {
   void put(std::int64_t t, std::int64_t k, std::int32_t i) {
     at_[t * n_tracks() + k] = i;
     if (i >= 0) labels_[i] = k;
+    forget(t);
   }
   // Takes an open detection from its track.
   void clear(std::int64_t t, std::int64_t i) {
     if (labels_[i] >= 0) at_[t * n_tracks() + labels_[i]] = -1;
     labels_[i] = -1;
+    forget(t);
   }
 
-  // Of detection i in track k, without those to one other track; empty without enough distances.
-  std::optional<double> distances(std::int64_t t, std::int64_t i, std::int64_t k,
-                                  std::int64_t without) {
-    const auto row = std::span(at_).subspan(t * n_tracks(), n_tracks());
-    const auto found = profiles_.support(k, all_.points[i], all_.points, row, without);
-    if (!found) return std::nullopt;
-    return kDistances * *found;
+  // Of detection i in track k, without those to one other track; -inf without enough distances, and
+  // perhaps where it is below `least`.
+  double distances(std::int64_t t, std::int64_t i, std::int64_t k, std::int64_t without,
+                   double least) {
+    return kDistances * support(t, i, k, without, least / kDistances).value;
+  }
+  // Of detection i in its own track, as above. It is computed once for each row of detections.
+  double own_distances(std::int64_t t, std::int64_t i, std::int64_t without) {
+    const std::int64_t k = labels_[i];
+    if (reach_[i] == kLater) {
+      const auto found = support(t, i, k, k, kLeast);
+      own_[i] = kDistances * found.value;
+      reach_[i] = static_cast<std::int8_t>(std::min(found.reach, kMaxReach));
+    }
+    if (reach_[i] > 0 && (reach_[i] == kMaxReach || profiles_.uses(k, reach_[i], without)))
+      return distances(t, i, k, without, kLeast);
+    return own_[i];
   }
   double max_distances(std::int64_t k) { return kDistances * profiles_.max_support(k); }
 
@@ -128,6 +141,12 @@ class AssignmentScore {
     found.peak = -all_.D / 2.0 * std::log(2 * std::numbers::pi * variance) - all_.log_clutter;
     return found;
   }
+  // Squared distance from the mean beyond which motion and distances cannot gain more than `gain`.
+  double range2(const SmoothMotion& of_track, double gain) const {
+    if (of_track.per_variance == 0) return std::numeric_limits<double>::infinity();
+    const double fall = of_track.peak + gain / kMotion;
+    return 1.000001 * std::expm1(std::max(2 * fall / (3 + all_.D), 0.0)) / of_track.per_variance;
+  }
   // Of a detection by the motion of its track; 0 where it is not known.
   double motion(std::int64_t i, const SmoothMotion& of_track) const {
     const double off2 = squared_distance(all_.points[i], of_track.mean, all_.D);
@@ -136,6 +155,19 @@ class AssignmentScore {
   }
 
  private:
+  DistanceProfiles::Support support(std::int64_t t, std::int64_t i, std::int64_t k,
+                                    std::int64_t without, double least) {
+    const auto row = std::span(at_).subspan(t * n_tracks(), n_tracks());
+    return profiles_.support(k, all_.points[i], all_.points, row, without, least);
+  }
+  // Forgets what depends on the row of a frame.
+  void forget(std::int64_t t) {
+    std::fill(reach_.begin() + all_.offsets[t], reach_.begin() + all_.offsets[t + 1], kLater);
+  }
+
+  static constexpr std::int8_t kLater = -1;
+  static constexpr std::int32_t kMaxReach = 127;
+  static constexpr double kLeast = -std::numeric_limits<double>::infinity();
   static constexpr double kDistances = 1.5, kMotion = 0.25;  // weights
   static constexpr double kUnaccelerated = 9, kUnmoved = 100;  // growth on one side
   static constexpr double kNone = 1e9;                         // frames
@@ -145,6 +177,9 @@ class AssignmentScore {
   std::span<std::int64_t> labels_;
   std::vector<std::int64_t> first_, last_;  // frames of each track before the assignment
   std::vector<std::int32_t> at_;            // by frame and track
+  // Of each detection: distances in its own track, and how many of the profile they took.
+  std::vector<double> own_;
+  std::vector<std::int8_t> reach_;
 };
 
 }  // namespace asterism

@@ -88,22 +88,40 @@ class DistanceProfiles {
   }
 
   // Log density of the distances of one detection to others of its frame by the profile of a track,
-  // relative to an unknown marker, without those to one other track. `at` is the index in `points`
-  // of each track in the frame, -1 for none. Empty where too few steady distances are there.
-  std::optional<double> support(std::int64_t track, const Point& y, std::span<const Point> points,
-                                std::span<const std::int32_t> at, std::int64_t without) {
+  // relative to an unknown marker.
+  struct Support {
+    double value = -std::numeric_limits<double>::infinity();
+    std::int32_t reach = 0;  // steady distances that were looked at, 0 where too few are there
+  };
+  // Without the distances to one other track. `at` is the index in `points` of each track in the
+  // frame, -1 for none. A support below `least` may be returned as one without distances.
+  Support support(std::int64_t track, const Point& y, std::span<const Point> points,
+                  std::span<const std::int32_t> at, std::int64_t without, double least) {
+    constexpr double kBeyondRounding = 1 - 1e-9;
+    const std::vector<Steady>& all = steadiest(track);
+    if (all.size() < kMinNeighbours) return {};
+    // No mean of log ratios is above the first, and each factor of the ratio is at most 1.
+    const double least_ratio =
+        kBeyondRounding * std::exp(kNeighbours / 2.0 * (least - all.front().log_ratio));
     double ratio = 1, sum = 0;
-    std::size_t n = 0;
-    for (const Steady& own : steadiest(track)) {
+    std::size_t n = 0, r = 0;
+    while (r < all.size() && n < kNeighbours) {
+      const Steady& own = all[r++];
       const std::int32_t point = at[own.reference];
       if (point < 0 || own.reference == without) continue;
       const double off = std::sqrt(squared_distance(y, points[point], all_.D)) - own.median;
       ratio *= (1 + off * off * own.per_unknown) / (1 + off * off * own.per_spread);
+      if (ratio < least_ratio) return {};
       sum += own.log_ratio;
-      if (++n == kNeighbours) break;
+      ++n;
     }
-    if (n < kMinNeighbours) return std::nullopt;
-    return (sum + 2 * std::log(ratio)) / static_cast<double>(n);
+    if (n < kMinNeighbours) return {};
+    return {(sum + 2 * std::log(ratio)) / static_cast<double>(n), static_cast<std::int32_t>(r)};
+  }
+  // Whether a support that looked at so many distances of a track has used that to another.
+  bool uses(std::int64_t track, std::int32_t reach, std::int64_t other) {
+    const auto all = std::span(steadiest(track)).first(static_cast<std::size_t>(reach));
+    return std::ranges::find(all, other, &Steady::reference) != all.end();
   }
   // No detection has a larger support in a track.
   double max_support(std::int64_t track) {

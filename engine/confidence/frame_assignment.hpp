@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "confidence/assignment_score.hpp"
@@ -19,7 +20,7 @@ namespace asterism {
 
 class FrameAssignment {
  public:
-  explicit FrameAssignment(AssignmentScore& score) : score_(score), motion_(score.n_tracks()) {}
+  explicit FrameAssignment(AssignmentScore& score) : score_(score), motion_(score.n_tracks()), range2_(score.n_tracks()) {}
 
   void run() {
     const auto offsets = score_.all().offsets;
@@ -31,10 +32,14 @@ class FrameAssignment {
   }
 
  private:
+  static constexpr double kNone = -std::numeric_limits<double>::infinity();
+
   void assign(std::int64_t t) {
     const OpenFrames& all = score_.all();
-    for (std::int64_t k = 0; k < score_.n_tracks(); ++k)
+    for (std::int64_t k = 0; k < score_.n_tracks(); ++k) {
       motion_[k] = score_.between(k, around(t, k));
+      range2_[k] = score_.range2(motion_[k], score_.max_distances(k));
+    }
     const std::int64_t first = all.offsets[t], end = all.offsets[t + 1];
     candidates_.clear();
     match_.assign(end - first, -1);
@@ -56,11 +61,16 @@ class FrameAssignment {
       if ((held >= 0 && !all.is_open[held]) || !score_.is_near(t, k)) continue;
       double gain = k == now ? all.change : 0;
       if (now < 0) gain -= all.change + all.ghost[i];
-      const double motion = score_.motion(i, motion_[k]);
-      if (k != now && gain + motion + score_.max_distances(k) <= 0) continue;
-      const auto distances = score_.distances(t, i, k, now);
-      if (k != now && !distances) continue;
-      if (distances) gain += *distances + motion;
+      if (k != now && gain <= 0 &&
+          squared_distance(all.points[i], motion_[k].mean, all.D) > range2_[k])
+        continue;
+      gain += score_.motion(i, motion_[k]);
+      if (k != now && gain + score_.max_distances(k) <= 0) continue;
+      const double distances =
+          k == now ? score_.own_distances(t, i, k) : score_.distances(t, i, k, now, -gain);
+      gain += distances;
+      // Without distances, a detection stays where it is.
+      if (distances == kNone) gain = k == now ? all.change : kNone;
       if (gain > 0) candidates_.push_back({row, k, gain});
     }
   }
@@ -82,6 +92,7 @@ class FrameAssignment {
   AssignmentScore& score_;
   // Of the frame that is assigned.
   std::vector<SmoothMotion> motion_;  // of each track
+  std::vector<double> range2_;        // beyond which it gains nothing
   std::vector<Candidate> candidates_;
   std::vector<std::int32_t> match_;
   Assignment assignment_;

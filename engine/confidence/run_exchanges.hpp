@@ -62,15 +62,13 @@ class RunExchanges {
     const auto is_open = score_.all().is_open;
     if ((i >= 0 && !is_open[i]) || (j >= 0 && !is_open[j])) return kImpossible;
     double gain = 0;
-    for (const auto& [own, point, other] : {std::tuple(a, i, b), std::tuple(b, j, a)}) {
-      if (point < 0) continue;
-      const auto now = score_.distances(one.t, point, own, other);
-      if (!now) return kImpossible;
-      gain -= *now;
-    }
-    if (j >= 0) gain += score_.distances(one.t, j, a, b).value_or(kImpossible);
-    if (gain + score_.max_distances(b) <= -kMaxLoss) return kImpossible;
-    if (i >= 0) gain += score_.distances(one.t, i, b, a).value_or(kImpossible);
+    if (i >= 0) gain -= score_.own_distances(one.t, i, b);
+    if (j >= 0) gain -= score_.own_distances(one.t, j, a);
+    if (gain == -kImpossible) return kImpossible;
+    const double most = score_.max_distances(b);
+    if (j >= 0) gain += score_.distances(one.t, j, a, b, -kMaxLoss - gain - most);
+    if (gain + most <= -kMaxLoss) return kImpossible;
+    if (i >= 0) gain += score_.distances(one.t, i, b, a, -kMaxLoss - gain);
     return gain > -kMaxLoss ? gain : kImpossible;
   }
 
