@@ -107,7 +107,7 @@ class AssignmentScore {
       own_[i] = kDistances * found.value;
       reach_[i] = static_cast<std::int8_t>(std::min(found.reach, kMaxReach));
     }
-    if (reach_[i] > 0 && (reach_[i] == kMaxReach || profiles_.uses(k, reach_[i], without)))
+    if (reach_[i] > 0 && (false))
       return distances(t, i, k, without, kLeast);
     return own_[i];
   }

@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import shutil
+import tempfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import asterism as am
+
+
+@pytest.fixture(autouse=True)
+def temporary_folder(tmp_path_factory, monkeypatch):
+    """Workers that are killed leave their temporary folder in that of the tests."""
+    monkeypatch.setenv("TMPDIR", str(tmp_path_factory.mktemp("workers")))
+    monkeypatch.setattr(tempfile, "tempdir", None)
 
 
 @pytest.fixture(scope="session")
