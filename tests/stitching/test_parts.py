@@ -29,6 +29,27 @@ def test_distances_are_remembered_for_four_hundred_frames(n_frames):
     assert variance[0] == pytest.approx(weights @ (far - weights @ far) ** 2, abs=1e-15)
 
 
+@pytest.mark.parametrize("n_markers", [2, 6, 11])
+def test_a_distance_is_that_of_the_frames_with_both_markers(n_markers):
+    rng = np.random.default_rng(n_markers)
+    neighbours = _engine.Neighbours(3, NOISE**2)
+    places, kept = rng.normal(0, 0.3, (n_markers, 3)), {}
+    for t in range(90):
+        points = places + rng.normal(0, 0.01, places.shape)
+        seen = np.flatnonzero((rng.uniform(size=n_markers) < 0.6) | (t == 0))
+        neighbours.add(seen, points[seen])
+        for i in seen:
+            for j in set(seen) - {i}:
+                kept.setdefault((i, j), []).append(np.linalg.norm(points[i] - points[j]))
+    for i in range(n_markers):
+        others, frames, mean, variance, predictive = neighbours.of(i)
+        assert sorted(others) == sorted({*range(n_markers)} - {i})
+        for j, n, m, v in zip(others, frames, mean, variance, strict=True):
+            far = np.array(kept[i, j])
+            assert (n, m, v) == (len(far), pytest.approx(far.mean()), pytest.approx(far.var()))
+        assert (np.diff(predictive) >= 0).all()
+
+
 def test_what_varies_is_unsteady():
     neighbours = _engine.Neighbours(2, NOISE**2)
     for t in range(200):
