@@ -58,16 +58,22 @@ struct SmoothMotion {
 class AssignmentScore {
  public:
   AssignmentScore(const OpenFrames& all, DistanceProfiles& profiles, std::span<std::int64_t> labels)
-      : all_(all), profiles_(profiles), labels_(labels), first_(n_tracks(), n_frames()),
-        last_(n_tracks(), -1), at_(n_frames() * n_tracks(), -1),
-        own_(labels.size()), reach_(labels.size(), kLater) {
-    for (std::int64_t t = 0; t < n_frames(); ++t)
-      for (std::int64_t i = all.offsets[t]; i < all.offsets[t + 1]; ++i)
-        if (const std::int64_t k = labels[i]; k >= 0) {
-          first_[k] = std::min(first_[k], t);
-          last_[k] = t;
-          at_[t * n_tracks() + k] = static_cast<std::int32_t>(i);
-        }
+      : all_(all), profiles_(profiles), labels_(labels), own_(labels.size()),
+        reach_(labels.size(), kLater) {
+    std::vector<std::int64_t> begin(n_tracks(), n_frames()), end(n_tracks(), 0);
+    each_labelled([&](std::int64_t t, std::int64_t, std::int64_t k) {
+      begin[k] = std::min(begin[k], std::max<std::int64_t>(t - all.max_gap, 0));
+      end[k] = std::min(t + all.max_gap + 1, n_frames());
+    });
+    std::int64_t n = 0;
+    for (std::int64_t k = 0; k < n_tracks(); ++k) {
+      near_.push_back({begin[k], end[k], n - begin[k]});
+      n += std::max<std::int64_t>(end[k] - begin[k], 0);
+    }
+    at_.assign(n, -1);
+    each_labelled([&](std::int64_t t, std::int64_t i, std::int64_t k) {
+      at_[near_[k].start + t] = static_cast<std::int32_t>(i);
+    });
   }
 
   const OpenFrames& all() const { return all_; }
@@ -75,20 +81,22 @@ class AssignmentScore {
   std::int64_t n_tracks() const { return static_cast<std::int64_t>(all_.sigma.size()); }
   std::int64_t label(std::int64_t i) const { return labels_[i]; }
   // Detection of a track in a frame, -1 for none.
-  std::int32_t at(std::int64_t t, std::int64_t k) const { return at_[t * n_tracks() + k]; }
+  std::int32_t at(std::int64_t t, std::int64_t k) const {
+    return is_near(t, k) ? at_[near_[k].start + t] : -1;
+  }
   // Whether a track is near a frame: long before or after it, another track may be of its marker.
   bool is_near(std::int64_t t, std::int64_t k) const {
-    return t >= first_[k] - all_.max_gap && t <= last_[k] + all_.max_gap;
+    return t >= near_[k].begin && t < near_[k].end;
   }
-  // Gives a track a detection, or none. The detection that it had must go elsewhere.
+  // Gives a track that is near a detection, or none. The detection that it had must go elsewhere.
   void put(std::int64_t t, std::int64_t k, std::int32_t i) {
-    at_[t * n_tracks() + k] = i;
+    at_[near_[k].start + t] = i;
     if (i >= 0) labels_[i] = k;
     forget(t);
   }
   // Takes an open detection from its track.
   void clear(std::int64_t t, std::int64_t i) {
-    if (labels_[i] >= 0) at_[t * n_tracks() + labels_[i]] = -1;
+    if (labels_[i] >= 0) at_[near_[labels_[i]].start + t] = -1;
     labels_[i] = -1;
     forget(t);
   }
@@ -107,7 +115,7 @@ class AssignmentScore {
       own_[i] = kDistances * found.value;
       reach_[i] = static_cast<std::int8_t>(std::min(found.reach, kMaxReach));
     }
-    if (reach_[i] > 0 && (false))
+    if (reach_[i] > 0 && (reach_[i] == kMaxReach || profiles_.uses(k, reach_[i], without)))
       return distances(t, i, k, without, kLeast);
     return own_[i];
   }
@@ -155,10 +163,21 @@ class AssignmentScore {
   }
 
  private:
+  // Frames of a track and those near it, and where they start in `at_`.
+  struct Near {
+    std::int64_t begin = 0, end = 0, start = 0;
+  };
+
+  template <typename Use>
+  void each_labelled(Use&& use) const {
+    for (std::int64_t t = 0; t < n_frames(); ++t)
+      for (std::int64_t i = all_.offsets[t]; i < all_.offsets[t + 1]; ++i)
+        if (labels_[i] >= 0) use(t, i, labels_[i]);
+  }
   DistanceProfiles::Support support(std::int64_t t, std::int64_t i, std::int64_t k,
                                     std::int64_t without, double least) {
-    const auto row = std::span(at_).subspan(t * n_tracks(), n_tracks());
-    return profiles_.support(k, all_.points[i], all_.points, row, without, least);
+    const auto at_now = [&](std::int32_t other) { return at(t, other); };
+    return profiles_.support(k, all_.points[i], all_.points, at_now, without, least);
   }
   // Forgets what depends on the row of a frame.
   void forget(std::int64_t t) {
@@ -175,8 +194,8 @@ class AssignmentScore {
   OpenFrames all_;
   DistanceProfiles& profiles_;
   std::span<std::int64_t> labels_;
-  std::vector<std::int64_t> first_, last_;  // frames of each track before the assignment
-  std::vector<std::int32_t> at_;            // by frame and track
+  std::vector<Near> near_;        // of each track, before the assignment
+  std::vector<std::int32_t> at_;  // by track and frame
   // Of each detection: distances in its own track, and how many of the profile they took.
   std::vector<double> own_;
   std::vector<std::int8_t> reach_;

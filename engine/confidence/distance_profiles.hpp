@@ -93,10 +93,11 @@ class DistanceProfiles {
     double value = -std::numeric_limits<double>::infinity();
     std::int32_t reach = 0;  // steady distances that were looked at, 0 where too few are there
   };
-  // Without the distances to one other track. `at` is the index in `points` of each track in the
+  // Without the distances to one other track. at(other) is the index in `points` of a track in the
   // frame, -1 for none. A support below `least` may be returned as one without distances.
-  Support support(std::int64_t track, const Point& y, std::span<const Point> points,
-                  std::span<const std::int32_t> at, std::int64_t without, double least) {
+  template <typename At>
+  Support support(std::int64_t track, const Point& y, std::span<const Point> points, At&& at,
+                  std::int64_t without, double least) {
     constexpr double kBeyondRounding = 1 - 1e-9;
     const std::vector<Steady>& all = steadiest(track);
     if (all.size() < kMinNeighbours) return {};
@@ -107,8 +108,9 @@ class DistanceProfiles {
     std::size_t n = 0, r = 0;
     while (r < all.size() && n < kNeighbours) {
       const Steady& own = all[r++];
-      const std::int32_t point = at[own.reference];
-      if (point < 0 || own.reference == without) continue;
+      if (own.reference == without) continue;
+      const std::int32_t point = at(own.reference);
+      if (point < 0) continue;
       const double off = std::sqrt(squared_distance(y, points[point], all_.D)) - own.median;
       ratio *= (1 + off * off * own.per_unknown) / (1 + off * off * own.per_spread);
       if (ratio < least_ratio) return {};
