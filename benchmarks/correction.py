@@ -72,10 +72,8 @@ def idf1(labels: NDArray[np.int64], truth: am.Tracks) -> float:
     return 2 * counts[rows, columns].sum() / n
 
 
-REASSIGN_AFTER = 5
-"""Number of actions after which the corrector looks at an assignment of all detections again."""
-RIGHT_FOR_A_WRONG = 3
-"""Number of right changes for each wrong one from which the corrector confirms the assignment."""
+WORTH = 3
+"""Number of detections that an action must mend."""
 NEAR = 25
 """Frames between detections of one stretch at most."""
 
@@ -88,9 +86,10 @@ class Corrector:
         self.start, self.model, self.stitching = tracked(truth)
         self.correction = am.tracking.Correction(self.start, self.model, self.stitching)
         self.stated: dict[int, int] = {}
+        self.parted: set[tuple[int, int]] = set()
         self.seen: set[int] = set()
         self.looked: set[tuple[int, int, int]] = set()
-        self.actions = self.looks = self.refused = self.next_reassign = 0
+        self.actions = self.looks = self.refused = 0
         self.seconds: list[float] = []
 
     @property
@@ -112,10 +111,20 @@ class Corrector:
     def run(self, limit: int) -> None:
         """Act until all is right, nothing is left to do, or the limit is reached."""
         while self.actions < limit and idf1(self.labels, self.truth) < ENOUGH:
-            if self.actions >= self.next_reassign and self.reassign():
-                continue
-            if not (self.choose() or self.search()):
+            if not (self.part() or self.reassign() or self.choose() or self.search()):
                 return
+
+    def part(self) -> bool:
+        """State that two stated markers, which are on one track, are different."""
+        tracks: dict[int, int] = {}
+        for detection in self.stated.values():
+            other = tracks.setdefault(int(self.labels[detection]), detection)
+            if other != detection and (other, detection) not in self.parted:
+                self.parted.add((other, detection))
+                self.actions += 1
+                self.edit("different", other, detection)
+                return True
+        return False
 
     def choose(self) -> bool:
         """Answer the first wrong identity that is offered and was not looked at before."""
@@ -138,19 +147,26 @@ class Corrector:
         return False
 
     def reassign(self) -> bool:
-        """Look at an assignment of all uncertain detections, and confirm it where it helps."""
+        """Look at an assignment of all uncertain detections, and confirm it where it helps most.
+
+        Groups of changes that make at least `WORTH` detections wrong are dismissed.
+        """
         self.looks += 1
-        self.next_reassign = self.actions + REASSIGN_AFTER
         wanted = np.append(self.mains(), -1)[self.truth.labels]
         change = self.edit("reassign")
         if change is None:
             return False
-        n_right = int((change.after == wanted[change.detections]).sum())
-        n_wrong = len(change.detections) - n_right
-        if n_right < max(RIGHT_FOR_A_WRONG * n_wrong, LINKS_AN_ACTION):
-            self.correction.undo()
+        self.correction.undo()
+        own, group = change.detections, np.array([each.group for each in change.stretches], int)
+        is_right = (change.after == wanted[own]).astype(int) - (change.before == wanted[own])
+        gains = np.zeros(len(group), dtype=int)
+        np.add.at(gains, group[change.stretch_of], is_right)
+        dismissed = np.flatnonzero(gains <= -WORTH)
+        gain, n = gains.sum() - gains[dismissed].sum(), 1 + len(dismissed)
+        if gain < WORTH * n:
             return False
-        self.actions += 1
+        self.edit("reassign", *change.of_groups(dismissed).tolist())
+        self.actions += n
         return True
 
     def detections(self, each: Decision) -> NDArray[np.int64]:
@@ -159,22 +175,28 @@ class Corrector:
         frame = self.d.frame_of[own]
         return own[(frame >= each.first) & (frame <= each.last)]
 
-    def search(self) -> bool:
-        """State the marker of the longest stretch that is not on the track of its marker."""
+    def longest(self) -> tuple[int, int]:
+        """Return the length and the middle of the longest stretch that is not on its track."""
         labels, truth = self.labels, self.truth.labels
         wanted = np.append(self.mains(), -1)[truth]
         order = np.lexsort((self.d.frame_of, labels, truth))
         order = order[labels[order] != wanted[order]]
         steps = np.diff(self.d.frame_of[order]) > NEAR
         edges = np.flatnonzero(np.diff(labels[order]) | np.diff(truth[order]) | steps) + 1
-        middles = [
-            (len(run), int(run[len(run) // 2])) for run in np.split(order, edges) if len(run)
-        ]
         known = {*self.seen, *self.stated.values()}
-        left = [(n, -i) for n, i in middles if i not in known]
-        if not left:
+        left = [
+            (len(run), -int(run[len(run) // 2]))
+            for run in np.split(order, edges)
+            if len(run) and int(run[len(run) // 2]) not in known
+        ]
+        n, i = max(left, default=(0, 1))
+        return n, -i
+
+    def search(self) -> bool:
+        """State the marker of the longest stretch that is not on the track of its marker."""
+        n, middle = self.longest()
+        if not n:
             return False
-        middle = -max(left)[1]
         self.seen.add(middle)
         return self.say(middle)
 
@@ -223,7 +245,7 @@ def by_hand(tracks: am.Tracks, truth: am.Tracks, limit: int) -> int:
     actions = 0
     for i in range(len(labels)):
         marker, label = truth.labels[i], labels[i]
-        if label == (of_marker[marker] if marker >= 0 else -1):
+        if label == (of_marker[marker] if marker >= 0 else -1) and (label >= 0) == (marker >= 0):
             continue
         later = np.arange(len(labels)) >= i
         if marker < 0:
@@ -231,7 +253,10 @@ def by_hand(tracks: am.Tracks, truth: am.Tracks, limit: int) -> int:
         elif label < 0:
             own = np.flatnonzero((truth.labels == marker) & later)
             ends = np.flatnonzero(labels[own] >= 0)
-            to = of_marker[marker] if of_marker[marker] >= 0 else labels.max() + 1
+            to = of_marker[marker]
+            if to < 0:
+                to = labels[own[ends[0]]] if len(ends) else -1
+                to = labels.max() + 1 if to in of_marker else to
             of_marker[marker] = to
             labels[own[: ends[0]] if len(ends) else own] = to
         elif of_marker[marker] < 0:

@@ -32,7 +32,7 @@ CLUTTER = -2
 """Label, while an edit is solved, of the detections without a track that one of them begins."""
 TRACKED = 3.0
 """Log odds of a detection that continues a track being of its marker instead of clutter."""
-MAX_SHARED = 0.02
+MAX_SHARED = 0.1
 """Largest share of the frames of a track that a track of the same marker may have too."""
 
 
@@ -94,7 +94,7 @@ class Solver:
         elif edit.kind == "name":
             self._call(own[0], edit.name)
         elif edit.kind == "reassign":
-            self._reassign()
+            self._reassign(own)
         if edit.kind in ("same", "name"):
             self._collect(int(self.labels[own[0]]))
 
@@ -341,17 +341,17 @@ class Solver:
         _, first = np.unique(frame[others], return_index=True)  # the most probable of each frame
         labels[others[first]] = track
 
-    def _reassign(self) -> None:
-        """Assign the uncertain detections and those without a track once more."""
+    def _reassign(self, kept: Sequence[int]) -> None:
+        """Assign the uncertain detections and those without a track once more, without some."""
         tracks = Tracks(detections=self._d, labels=self.labels, names=tuple(self.names))
         assessed = settled(
             assess(tracks, self._model, self._stitching), self._constraints.edits
         ).identity_confidence
         assert assessed is not None
-        is_open = (self.labels >= 0) & (assessed < UNCERTAIN)
-        is_open[list(self._constraints.pinned)] = False
+        is_open = (self.labels >= 0) & (assessed < UNCERTAIN) | self._free()
+        is_open[[*self._constraints.pinned, *self._constraints.kept, *kept]] = False
         self.labels = reassigned(
-            tracks, is_open | self._free(), self.evidence.ghost, self._model.sensor.noise_sigma
+            tracks, is_open, self.evidence.ghost, self._model.sensor.noise_sigma
         )
 
     def _free(self) -> NDArray[np.bool_]:
