@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +15,7 @@ from asterism.tracking.correction.constraints import Constraints, detections_of
 from asterism.tracking.correction.continuation import continuation
 from asterism.tracking.correction.evidence import Evidence
 from asterism.tracking.correction.exchange import Lane, Motion, best_exchange
+from asterism.tracking.correction.segments import with_lost_segments
 from asterism.tracking.correction.settled import settled
 
 if TYPE_CHECKING:
@@ -350,9 +352,16 @@ class Solver:
         assert assessed is not None
         is_open = (self.labels >= 0) & (assessed < UNCERTAIN) | self._free()
         is_open[[*self._constraints.pinned, *self._constraints.kept, *kept]] = False
-        self.labels = reassigned(
+        labels, is_placed = with_lost_segments(tracks, is_open)
+        tracks, is_open = replace(tracks, labels=labels), is_open & ~is_placed
+        labels = reassigned(
             tracks, is_open, self.evidence.ghost, self._model.sensor.noise_sigma
         )
+        # Without distances at its best, a marker is no clutter: its identity must be improbable.
+        slots = self._d.frame_of * len(self.names)
+        is_back = (self.labels >= 0) & (labels < 0) & (assessed > 1 - UNCERTAIN)
+        is_back &= ~np.isin(slots + self.labels, (slots + labels)[labels >= 0])
+        self.labels = np.where(is_back, self.labels, labels)
 
     def _free(self) -> NDArray[np.bool_]:
         """Return which detections have no track, without those that an edit is about.
