@@ -162,7 +162,8 @@ class Solver:
     def _drop(self, detection: int) -> None:
         """Make the part of a detection clutter.
 
-        Detections that no tracklet had are a part as far as they follow each other in the track.
+        Detections that no tracklet had are a part as far as they follow each other in the track. If
+        the part keeps the distances of its track and the detection does not, it is dropped alone.
         """
         track = int(self.labels[detection])
         if track < 0:
@@ -173,6 +174,10 @@ class Solver:
             runs = np.cumsum(~is_in)
             is_in &= runs == runs[np.searchsorted(own, detection)]
         own = own[is_in]
+        unknown = len(self.names)
+        gain = self.evidence.gains(own, np.zeros_like(own), self.labels, [unknown])[0].sum()
+        if self._fits_alone(detection, gain, unknown):
+            own = np.array([detection])
         pinned = np.isin(own, list(self._constraints.pinned))
         frame = self._d.frame_of
         low = frame[own[pinned & (own < detection)]].max(initial=-1)
@@ -229,8 +234,9 @@ class Solver:
             return None
         if lanes is None:
             lanes = self._lanes(source, [target], self.labels)[target]
-            if source != CLUTTER and self._is_in_mixed_part(detection, lanes[0], target):
-                part = int(self.evidence.part_of[detection])
+            part = int(self.evidence.part_of[detection])
+            gain = lanes[0].gains[self.evidence.part_of[lanes[0].detections] == part].sum()
+            if source != CLUTTER and self._fits_alone(detection, gain, target):
                 lanes = self._track_lanes(source, [target], self.labels, part)[0], lanes[1]
         group = self._constraints.group(detection)
         both = group if beside is None else {*group, beside}
@@ -248,14 +254,13 @@ class Solver:
             for lane, then in zip(lanes, (target, source), strict=True)
         ]
 
-    def _is_in_mixed_part(self, detection: int, lane: Lane, target: int) -> bool:
-        """Return whether a detection fits another track that its part does not fit."""
-        parts = self.evidence.part_of
-        part = parts[detection]
-        if lane.gains[parts[lane.detections] == part].sum() >= 0:
-            return False
+    def _fits_alone(self, detection: int, gain: float, target: int) -> bool:
+        """Return whether a detection fits another track that its part does not fit.
+
+        The gain is that of the part.
+        """
         own = np.array([detection])
-        return bool(self.evidence.gains(own, parts[own], self.labels, [target])[0, 0] > 0)
+        return gain < 0 < self.evidence.gains(own, own, self.labels, [target])[0, 0]
 
     def _lanes(
         self, source: int, targets: Sequence[int], labels: NDArray[np.int64]
@@ -371,7 +376,8 @@ class Solver:
         stated = [*self._constraints.clutter, *self._constraints.pinned]
         free, parts = self.labels < 0, self.evidence.part_of
         free[stated] = False
-        ghosts = {int(parts[i]) for i in self._constraints.clutter} - {-1}
+        of_tracks = parts[self.labels >= 0].tolist()
+        ghosts = {int(parts[i]) for i in self._constraints.clutter} - {-1, *of_tracks}
         return free & ~np.isin(parts, list(ghosts)) if ghosts else free
 
 
