@@ -127,24 +127,29 @@ class Corrector:
         return False
 
     def choose(self) -> bool:
-        """Answer the first wrong identity that is offered and was not looked at before."""
+        """Answer the offered identity that has the most wrong detections."""
         tracks = am.tracking.assess(self.correction.tracks, self.model, self.stitching)
         pinned = self.correction.constraints.pinned
-        main = self.mains()
-        for each in sorted(tracks.decisions, key=lambda one: -one.expected_wrong):
-            key = (each.track, each.first, each.last)
-            if each.kind != "identity" or each.expected_wrong < MIN_EXPECTED or key in self.looked:
+        main = np.append(self.mains(), -1)
+        best, found = self.longest()[0] - 1, -1
+        for each in tracks.decisions:
+            if each.kind != "identity" or each.expected_wrong < MIN_EXPECTED:
                 continue
             own = self.detections(each)
-            if not len(own) or pinned & set(own.tolist()):
-                continue
+            key = (each.track, each.first, each.last)
+            self.looks += key not in self.looked
             self.looked.add(key)
-            self.looks += 1
-            marker = int(np.bincount(self.truth.labels[own] + 1).argmax()) - 1
-            if (main[marker] if marker >= 0 else -1) != each.track:
-                of_marker = own[self.truth.labels[own] == marker]
-                return self.say(int(of_marker[len(of_marker) // 2]))
-        return False
+            markers = self.truth.labels[own]
+            marker = int(np.bincount(markers + 1).argmax()) - 1
+            of_marker = own[markers == marker]
+            middle = int(of_marker[len(of_marker) // 2])
+            is_known = pinned & set(own.tolist()) or middle in self.seen
+            if main[marker] != each.track and len(of_marker) > best and not is_known:
+                best, found = len(of_marker), middle
+        if found < 0:
+            return False
+        self.seen.add(found)
+        return self.say(found)
 
     def reassign(self) -> bool:
         """Look at an assignment of all uncertain detections, and confirm it where it helps most.
@@ -201,12 +206,22 @@ class Corrector:
         return self.say(middle)
 
     def say(self, detection: int) -> bool:
+        """State of which marker a detection is, and undo it if most of what changed is wrong."""
+        stated = dict(self.stated)
+        change = self.state(detection)
+        if change is not None:
+            wanted = np.append(self.mains(), -1)[self.truth.labels[change.detections]]
+            if 2 * (change.after == wanted).sum() < len(wanted):
+                self.correction.undo()
+                self.stated = stated
+        return True
+
+    def state(self, detection: int) -> Change | None:
         """State of which marker a detection is."""
         self.actions += 1
         marker, labels = int(self.truth.labels[detection]), self.labels
         if marker < 0:
-            self.edit("clutter", detection)
-            return True
+            return self.edit("clutter", detection)
         if marker not in self.stated:
             own = np.flatnonzero(
                 (self.truth.labels == marker) & (labels == self.mains()[marker]) & (labels >= 0)
@@ -216,12 +231,9 @@ class Corrector:
             self.stated[marker] = self.correction.anchor(own) if len(own) else detection
             if not len(own):  # it has no track
                 if labels[detection] >= 0 and len(others):
-                    self.edit("different", self.correction.anchor(others), detection)
-                else:
-                    self.edit("name", detection)
-                return True
-        self.edit("same", self.stated[marker], detection)
-        return True
+                    return self.edit("different", self.correction.anchor(others), detection)
+                return self.edit("name", detection)
+        return self.edit("same", self.stated[marker], detection)
 
     def edit(self, kind: EditKind, *detections: int) -> Change | None:
         """Apply an edit, and measure how long that takes."""

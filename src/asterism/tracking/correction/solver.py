@@ -232,8 +232,9 @@ class Solver:
         """
         if not self._may_be(detection, target):
             return None
-        if lanes is None:
-            lanes = self._lanes(source, [target], self.labels)[target]
+        is_new = target == len(self.names)
+        if lanes is None or is_new:
+            lanes = lanes or self._lanes(source, [target], self.labels)[target]
             part = int(self.evidence.part_of[detection])
             gain = lanes[0].gains[self.evidence.part_of[lanes[0].detections] == part].sum()
             if source != CLUTTER and self._fits_alone(detection, gain, target):
