@@ -189,11 +189,8 @@ class Corrector:
         steps = np.diff(self.d.frame_of[order]) > NEAR
         edges = np.flatnonzero(np.diff(labels[order]) | np.diff(truth[order]) | steps) + 1
         known = {*self.seen, *self.stated.values()}
-        left = [
-            (len(run), -int(run[len(run) // 2]))
-            for run in np.split(order, edges)
-            if len(run) and int(run[len(run) // 2]) not in known
-        ]
+        runs = [run[~np.isin(run, list(known))] for run in np.split(order, edges)]
+        left = [(len(run), -int(run[len(run) // 2])) for run in runs if len(run)]
         n, i = max(left, default=(0, 1))
         return n, -i
 

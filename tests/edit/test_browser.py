@@ -281,7 +281,7 @@ def test_changes_of_a_preview_are_left_out_by_keyboard_and_pointer(browser, by_m
     page.key("t")
     page.wait(f"{PREVIEW}.includes('would change')")
     n = [n_previewed(page)]
-    rows = page.run("document.querySelectorAll('.offered li').length")
+    rows = page.run("document.querySelectorAll('.offered > li').length")
     assert rows > 1
     page.key("1")
     n.append(n_previewed(page))

@@ -236,16 +236,15 @@ class Editor {
       about.textContent = `Assigned again, ${counted(n, "point")} would change:`;
     };
     const rows = groups.map((group, i) => {
-      const toggle = button("Leave", i < 9 ? `${i + 1}` : "", () => this.leave(i));
+      const toggle = button("Leave out", i < 9 ? `${i + 1}` : "", () => this.leave(i));
       toggle.ariaPressed = "false";
-      const lines = group.map((each) => make("div", {}, ...this.changes.line(each)));
-      return make("li", {}, ...lines, toggle);
+      return make("li", {}, this.changes.listed(group), toggle);
     });
     this.leave = (i) => {
       if (i >= groups.length) return;
       const { group } = groups[i][0];
       if (!left.delete(group)) left.add(group);
-      rows[i].classList.toggle("left", left.has(group));
+      rows[i].classList.toggle("omitted", left.has(group));
       rows[i].querySelector("button").ariaPressed = `${left.has(group)}`;
       count();
     };
@@ -310,6 +309,7 @@ function grouped(stretches) {
   const groups = new Map();
   for (const each of stretches) groups.set(each.group, [...(groups.get(each.group) ?? []), each]);
   const size = (group) => group.reduce((sum, each) => sum + each.n_detections, 0);
+  for (const group of groups.values()) group.sort((a, b) => b.n_detections - a.n_detections);
   return [...groups.values()].sort((a, b) => size(b) - size(a));
 }
 

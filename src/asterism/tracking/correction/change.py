@@ -151,10 +151,10 @@ def _groups(
             stretch = groups[stretch]
         return stretch
 
-    given = {(t, k): i for t, k, i in zip(frame.tolist(), before.tolist(), stretch_of.tolist())
-             if k >= 0}
-    for t, k, i in zip(frame.tolist(), after.tolist(), stretch_of.tolist(), strict=True):
-        if (t, k) in given:
+    times, of = frame.tolist(), stretch_of.tolist()
+    given = dict(zip(zip(times, before.tolist(), strict=True), of, strict=True))
+    for t, k, i in zip(times, after.tolist(), of, strict=True):
+        if k >= 0 and (t, k) in given:
             one, other = sorted((first(i), first(given[t, k])))
             groups[other] = one
     return [first(i) for i in range(len(groups))]

@@ -87,7 +87,7 @@ def with_lost_segments(
                 for i in range(len(known), len(rows))
             ]
             found = _placed(d.points[rows], nodes, len(known), distances, sigma, log_volume)
-            for k, i in found:
+            for k, _ in found:
                 before = held[t, own[k]]
                 if before >= 0 and labels[before] == own[k]:
                     labels[before] = -1
@@ -170,6 +170,4 @@ def _cliques(
             yield score, clique
         for n, one in enumerate(left):
             gain = alone[one] + ratio[one, clique].sum()
-            stack.append(
-                (score + gain, [*clique, one], [i for i in left[n + 1 :] if fits[one, i]])
-            )
+            stack.append((score + gain, [*clique, one], [i for i in left[n + 1 :] if fits[one, i]]))

@@ -360,9 +360,7 @@ class Solver:
         is_open[[*self._constraints.pinned, *self._constraints.kept, *kept]] = False
         labels, is_placed = with_lost_segments(tracks, is_open)
         tracks, is_open = replace(tracks, labels=labels), is_open & ~is_placed
-        labels = reassigned(
-            tracks, is_open, self.evidence.ghost, self._model.sensor.noise_sigma
-        )
+        labels = reassigned(tracks, is_open, self.evidence.ghost, self._model.sensor.noise_sigma)
         # Without distances at its best, a marker is no clutter: its identity must be improbable.
         slots = self._d.frame_of * len(self.names)
         is_back = (self.labels >= 0) & (labels < 0) & (assessed > 1 - UNCERTAIN)
