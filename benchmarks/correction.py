@@ -3,8 +3,9 @@
 The corrector states the marker where the most detections are wrong: an uncertain identity that the
 editor offers, or a longer stretch. Before each statement it looks at what an assignment of all
 uncertain detections would change. Changes that make at least three detections wrong are left out,
-each of which is an action. It confirms the others, an action too, if at least three detections an
-action become right. A statement of which most changes are wrong is undone, and counts. It has one
+each of which is an action. It confirms the others, an action too, if each action makes at least
+three detections right, and a quarter of the longest wrong stretch. A statement that makes more
+detections wrong than right is undone, and counts; once no other is left, it is kept. There is one
 action for three wrong links, and 420 at most.
 
 The goal is an IDF1 of 0.999, or that of the oracle where occlusions keep it below. Results that
@@ -77,6 +78,8 @@ def idf1(labels: NDArray[np.int64], truth: am.Tracks) -> float:
 
 WORTH = 3
 """Number of detections that an action must mend where an assignment is confirmed."""
+SHARE = 4
+"""Of the longest wrong stretch, the divisor of the number of detections that it must mend too."""
 NEAR = 25
 """Frames between detections of one stretch at most."""
 
@@ -93,6 +96,7 @@ class Corrector:
         self.seen: set[int] = set()
         self.looked: set[tuple[int, int, int]] = set()
         self.actions = self.looks = self.refused = 0
+        self.undoes = True
         self.seconds: list[float] = []
 
     @property
@@ -114,8 +118,12 @@ class Corrector:
     def run(self, goal: float, limit: int) -> None:
         """Act until the IDF1 is at the goal, nothing is left to do, or the limit is reached."""
         while self.actions < limit and idf1(self.labels, self.truth) < goal:
-            if not (self.part() or self.reassign(limit) or self.choose() or self.search()):
+            if self.part() or self.reassign(limit) or self.choose() or self.search():
+                continue
+            if not self.undoes:
                 return
+            self.undoes = False
+            self.seen.clear()
 
     def part(self) -> bool:
         """State that two stated markers, which are on one track, are different."""
@@ -171,9 +179,9 @@ class Corrector:
         np.add.at(gains, group[change.stretch_of], is_right)
         without = np.flatnonzero(gains <= -WORTH)
         gain, n = gains.sum() - gains[without].sum(), 1 + len(without)
-        if gain < WORTH * n or self.actions + n > limit:
+        if gain < max(WORTH, self.longest()[0] // SHARE) * n or self.actions + n > limit:
             return False
-        self.edit("reassign", *change.of_groups(without).tolist())
+        self.edit("reassign", *change.of_groups(without.tolist()).tolist())
         self.actions += n
         return True
 
@@ -206,12 +214,13 @@ class Corrector:
         return self.say(middle)
 
     def say(self, detection: int) -> bool:
-        """State of which marker a detection is, and undo it if most of what changed is wrong."""
+        """State of which marker a detection is, and undo it if more becomes wrong than right."""
         stated = dict(self.stated)
         change = self.state(detection)
         if change is not None:
             wanted = np.append(self.mains(), -1)[self.truth.labels[change.detections]]
-            if 2 * (change.after == wanted).sum() < len(wanted):
+            is_worse = (change.before == wanted).sum() > (change.after == wanted).sum()
+            if is_worse and self.undoes:
                 self.correction.undo()
                 self.stated = stated
         return True
