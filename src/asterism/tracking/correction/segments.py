@@ -7,6 +7,7 @@ ever clutter.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -30,6 +31,9 @@ MIN_LOST, MIN_PLACED = 2, 3
 """Smallest number of markers of a segment that are lost in a frame, and that are there after it."""
 MAX_DEVIATION = 3.0
 """Largest deviation of a distance, in standard deviations."""
+MAX_SETS = 10_000
+"""Largest number of sets of detections that are compared in a frame. There are more if more than 13
+markers are lost, or if most distances are alike; the segment is then left as it is."""
 
 _Node = tuple[int, int]
 """Marker of a segment, and detection."""
@@ -139,9 +143,11 @@ def _placed(
     if not len(used):
         return []
     alone = ratio[:, :n_known].sum(axis=1) - price
-    best, best_score = [], 0.0
-    found = sorted(_cliques(used.tolist(), fits, ratio, alone), key=lambda one: -one[0])
+    found = list(itertools.islice(_cliques(used.tolist(), fits, ratio, alone), MAX_SETS + 1))
+    if len(found) > MAX_SETS:
+        return []
     found = [one for one in found if len(one[1]) + n_known >= MIN_PLACED]
+    found.sort(key=lambda one: -one[0])
     if not found or found[0][0] <= 0:
         return []
     best_score, best = found[0]
