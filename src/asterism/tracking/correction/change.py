@@ -151,12 +151,19 @@ def _groups(
             stretch = groups[stretch]
         return stretch
 
-    times, of = frame.tolist(), stretch_of.tolist()
-    given = dict(zip(zip(times, before.tolist(), strict=True), of, strict=True))
-    for t, k, i in zip(times, after.tolist(), of, strict=True):
-        if k >= 0 and (t, k) in given:
-            one, other = sorted((first(i), first(given[t, k])))
-            groups[other] = one
+    n_tracks = int(max(before.max(initial=-1), after.max(initial=-1))) + 1
+    left, taken = np.flatnonzero(before >= 0), np.flatnonzero(after >= 0)
+    places = frame[left] * n_tracks + before[left]
+    left = left[np.argsort(places, kind="stable")]
+    places = np.sort(places)
+    place = frame[taken] * n_tracks + after[taken]
+    at = np.searchsorted(places, place)
+    is_same = at < len(places)
+    is_same[is_same] = places[at[is_same]] == place[is_same]
+    pairs = np.stack([stretch_of[taken[is_same]], stretch_of[left[at[is_same]]]], axis=1)
+    for one, other in np.unique(pairs, axis=0).tolist():
+        low, high = sorted((first(one), first(other)))
+        groups[high] = low
     return [first(i) for i in range(len(groups))]
 
 

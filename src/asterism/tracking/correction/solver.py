@@ -375,8 +375,9 @@ class Solver:
         stated = [*self._constraints.clutter, *self._constraints.pinned]
         free, parts = self.labels < 0, self.evidence.part_of
         free[stated] = False
-        of_tracks = parts[self.labels >= 0].tolist()
-        ghosts = {int(parts[i]) for i in self._constraints.clutter} - {-1, *of_tracks}
+        ghosts = {int(parts[i]) for i in self._constraints.clutter} - {-1}
+        if ghosts:  # a part of which some detections are of a track is no ghost
+            ghosts -= set(parts[np.isin(parts, list(ghosts)) & (self.labels >= 0)].tolist())
         return free & ~np.isin(parts, list(ghosts)) if ghosts else free
 
 
