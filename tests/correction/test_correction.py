@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 
 import numpy as np
@@ -12,6 +13,7 @@ from asterism.edit import Session
 from asterism.model import Edit
 from asterism.simulate import Burst, Ghosts
 from asterism.tracking.attempts import Uncorrected
+from asterism.tracking.correction.change import change_of
 from asterism.tracking.correction.constraints import Constraints, detections_of
 from asterism.tracking.correction.solver import Solver
 from tests.scenes import sized
@@ -411,3 +413,65 @@ def test_emptied_tracks_do_not_hinder_an_assignment_of_all():
     again = lost & (truth.labels != last)
     assert (found.labels[again] == truth.labels[again]).mean() > 0.9
     assert (found.labels[truth.labels == last] == -1).all()
+
+
+def test_detections_of_an_assignment_stay_now_and_later():
+    truth = am.simulate.person(activity="walk", frames=200, seed=3)
+    tracks, _ = holes(truth, 0.05, 3)
+    d, model = truth.detections, am.estimate_model(truth.detections).model
+    correction = am.tracking.Correction(tracks, model)
+    change = correction.apply(REASSIGN)
+    correction.undo()
+    kept = change.of_groups([change.stretches[0].group])
+    assert 0 < len(kept) < len(change.detections)
+    some = correction.apply(Edit(kind="reassign", at=at(d, *kept)))
+    assert set(kept.tolist()) | set(some.detections.tolist()) == set(change.detections.tolist())
+    assert not set(kept.tolist()) & set(some.detections.tolist())
+    assert not set(kept.tolist()) & set(correction.apply(REASSIGN).detections.tolist())
+
+
+def test_stretches_that_take_the_place_of_each_other_are_one_group():
+    frame = np.repeat(np.arange(4), 3)
+    before = np.tile([0, 1, -1], 4)
+    after = before.copy()
+    after[3:6] = [1, 0, -1]  # both exchanged in frame 1
+    after[11] = 2  # a detection without a track in frame 3
+    edit = Edit(kind="reassign", at=())
+    change = change_of(edit, (), frame, (before, after), ([None] * 3, [None] * 3))
+    assert [(each.source, each.target, each.group) for each in change.stretches] == [
+        (0, 1, 0), (1, 0, 0), (-1, 2, 2),
+    ]  # fmt: skip
+    assert change.of_groups([0]).tolist() == [3, 4]
+    assert change.of_groups([2]).tolist() == [11]
+
+
+def test_two_tracks_of_a_marker_that_alternate_become_one():
+    truth = am.simulate.person(activity="walk", frames=400, seed=3)
+    d, model = truth.detections, am.estimate_model(truth.detections).model
+    other = truth.n_tracks
+    own = np.flatnonzero(truth.labels == 0)
+    second = own[(d.frame_of[own] // 20) % 2 == 1]
+    labels = truth.labels.copy()
+    labels[second] = other
+    wrong = np.flatnonzero(truth.labels == 1)
+    wrong = wrong[np.isin(d.frame_of[wrong], [5, 45, 85, 125, 165, 205, 245, 285])]
+    labels[wrong] = other  # 4 % of the frames of the second track are those of the first
+    tracks = am.Tracks(detections=d, labels=labels, names=(None,) * (other + 1))
+    found = am.tracking.correct(
+        tracks, [Edit(kind="same", at=at(d, int(own[0]), int(second[50])))], model
+    )
+    assert (found.labels[own] == found.labels[own[0]]).all()
+
+
+def test_a_detection_that_does_not_fit_its_part_is_dropped_alone():
+    truth = am.simulate.person(activity="walk", frames=200, seed=3)
+    d = truth.detections
+    own = np.flatnonzero(truth.labels == 4)
+    points = d.points.copy()
+    points[own[100]] += [0.03, 0.03, 0.03]
+    moved = dataclasses.replace(d, points=points)
+    tracks = am.Tracks(detections=moved, labels=truth.labels, names=truth.names)
+    model = am.estimate_model(d).model
+    correction = am.tracking.Correction(tracks, model)
+    correction.apply(Edit(kind="clutter", at=at(moved, int(own[100]))))
+    assert (correction.tracks.labels[own] < 0).nonzero()[0].tolist() == [100]

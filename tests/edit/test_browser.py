@@ -248,12 +248,17 @@ def test_a_point_of_clutter_is_joined_by_keyboard(browser, served):
 PREVIEW = "document.getElementById('filling').innerText"
 
 
+def n_previewed(page):
+    """Return the number of points that the preview of an assignment would change."""
+    return int(page.run(PREVIEW).split("Assigned again, ")[1].split()[0].replace(",", ""))
+
+
 def test_an_assignment_of_all_points_is_previewed_and_confirmed(browser, by_method):
     page = opened(browser, by_method)
     page.key("t")
     page.wait(f"{PREVIEW}.includes('would change')")
     assert not (by_method.folder / "trial.edits.toml").exists()
-    n = int(page.run(PREVIEW).split("Assigned again, ")[1].split()[0])
+    n = n_previewed(page)
     page.key("Escape")
     page.wait(f"{PREVIEW} === ''")
     page.run("document.getElementById('edit-reassign').click()")
@@ -267,6 +272,28 @@ def test_an_assignment_of_all_points_is_previewed_and_confirmed(browser, by_meth
     assert "Take back" in page.run("document.getElementById('changed').innerText")
     page.key("r")
     on_disk(page, 2)
+    assert_same_tracks(page, session_of(by_method, am.GNN()))
+    page.close()
+
+
+def test_changes_of_a_preview_are_left_out_by_keyboard_and_pointer(browser, by_method):
+    page = opened(browser, by_method)
+    page.key("t")
+    page.wait(f"{PREVIEW}.includes('would change')")
+    n = [n_previewed(page)]
+    rows = page.run("document.querySelectorAll('.offered > li').length")
+    assert rows > 1
+    page.key("1")
+    n.append(n_previewed(page))
+    page.run("document.querySelectorAll('.offered button')[1].click()")
+    n.append(n_previewed(page))
+    assert n[0] > n[1] > n[2]
+    assert page.run("document.querySelectorAll('.offered [aria-pressed=true]').length") == 2
+    page.run("document.querySelectorAll('.offered button')[1].click()")
+    page.key("Enter")
+    on_disk(page, 1)
+    (edit,) = edits_of(by_method)
+    assert (edit.kind, len(edit.at)) == ("reassign", n[0] - n[1])
     assert_same_tracks(page, session_of(by_method, am.GNN()))
     page.close()
 

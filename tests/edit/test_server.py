@@ -53,7 +53,9 @@ def test_an_assignment_is_on_disk_once_it_is_confirmed_and_not_before(by_method)
     assert status == 200
     assert preview["stretches"]
     assert not path.exists()
-    status, answer = by_method.post("reassign")
+    version = preview["version"]
+    assert by_method.post("reassign", version=version + 1, without=[])[0] == 409
+    status, answer = by_method.post("reassign", version=version, without=[])
     assert status == 200
     assert answer["stretches"] == preview["stretches"]
     (edit,) = am.io.read_edits(path, capture)
@@ -63,6 +65,26 @@ def test_an_assignment_is_on_disk_once_it_is_confirmed_and_not_before(by_method)
     )
     assert session.tracks.labels[answer["detections"]].tolist() == answer["labels"]
     assert by_method.post("edit", kind="reassign", detections=[0], name="")[0] != 200
+
+
+def test_changes_that_are_left_out_stay_out_of_later_assignments(by_method):
+    capture, path = am.read(by_method.folder / CAPTURE), by_method.folder / "trial.edits.toml"
+    _, preview = by_method.post("preview_reassign")
+    stretches = preview["stretches"]
+    group = stretches[0]["group"]
+    n = sum(each["n_detections"] for each in stretches if each["group"] == group)
+    assert n < sum(each["n_detections"] for each in stretches)
+    status, answer = by_method.post("reassign", version=preview["version"], without=[group])
+    assert status == 200
+    (edit,) = am.io.read_edits(path, capture)
+    kept = [int(capture.offsets[frame]) + point for frame, point in edit.at]
+    assert len(kept) == n
+    assert answer["detections"]
+    assert not set(kept) & set(answer["detections"])
+    _, again = by_method.post("preview_reassign")
+    status, answer = by_method.post("reassign", version=again["version"], without=[])
+    assert status == 200
+    assert not set(kept) & set(answer["detections"])
 
 
 def test_contradictions_are_refused_and_change_nothing(served):

@@ -57,6 +57,7 @@ class Hub:
         self._lock = asyncio.Lock()
         self._log: list[dict[str, Any]] = []
         self._changes: dict[int, Change] = {}
+        self._offer: tuple[int, Change] | None = None  # preview of an assignment, and its version
         self._readers: set[asyncio.Queue[_Event | None]] = set()
         self._n_undone = 0
         self._names: Sequence[str] = session.tracks.display_names
@@ -147,7 +148,9 @@ class Hub:
             own = [view.detection(i) for i in message["detections"]]
             return session.edit(message["kind"], *own, name=message["name"])
         if action == "reassign":
-            return session.edit("reassign")
+            if self._offer is None or not self._offer[0] == message["version"] == len(self._log):
+                raise ParameterError("version", "that of the last preview", message["version"])
+            return session.edit("reassign", *self._offer[1].of_groups(message["without"]).tolist())
         if action == "fill":
             return session.fill(*self._gap(message), message["kind"])
         at = self._assessment_of - message["assessment"]
@@ -187,7 +190,8 @@ class Hub:
         async with self._lock:
             edit = self.session.edit("reassign")
             change = await asyncio.to_thread(self.session.preview, edit)
-        return {"stretches": self.view.stretches(change)}
+            self._offer = len(self._log), change
+        return {"stretches": self.view.stretches(change), "version": self._offer[0]}
 
     async def _save(self) -> dict[str, Any]:
         async with self._lock:

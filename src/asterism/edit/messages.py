@@ -12,12 +12,13 @@ __all__ = ["Message", "parsed"]
 
 Message = dict[str, Any]
 _NUMBER, _TEXT, _NUMBERS, _CHOICE = "a whole number", "a text", "a list of numbers", "a number"
+_GROUPS = "a list of groups"
 _FIELDS: dict[str, dict[str, str]] = {
     "edit": {"kind": _TEXT, "detections": _NUMBERS, "name": _TEXT},
     "fill": {"kind": _TEXT, "track": _NUMBER, "first": _NUMBER, "last": _NUMBER},
     "preview": {"track": _NUMBER, "first": _NUMBER, "last": _NUMBER},
     "preview_reassign": {},
-    "reassign": {},
+    "reassign": {"version": _NUMBER, "without": _GROUPS},
     "choose": {"assessment": _NUMBER, "decision": _NUMBER, "alternative": _CHOICE},
     "refuse": {"version": _NUMBER, "stretch": _NUMBER},
     "undo": {},
@@ -31,6 +32,7 @@ _KINDS = {
 }
 _MAX_TEXT = 200
 _MAX_DETECTIONS = 2
+_MAX_GROUPS = 1000
 
 
 def parsed(action: str, body: bytes) -> Message:
@@ -90,6 +92,12 @@ def _is(value: Any, kind: str) -> bool:
         return (
             isinstance(value, list)
             and 1 <= len(value) <= _MAX_DETECTIONS
+            and all(_is(each, _NUMBER) for each in value)
+        )
+    if kind == _GROUPS:
+        return (
+            isinstance(value, list)
+            and len(value) <= _MAX_GROUPS
             and all(_is(each, _NUMBER) for each in value)
         )
     return (kind == _CHOICE and value is None) or (type(value) is int and 0 <= value < 2**53)

@@ -237,11 +237,7 @@ class Session:
         if stretch.is_asked:
             hint = "undo the edit instead"
             raise ParameterError("i", "a stretch that followed from the edit", i, hint)
-        frame = self.tracks.detections.frame_of
-        own = change.detections[
-            (change.before == stretch.source) & (change.after == stretch.target)
-        ]
-        own = own[(frame[own] >= stretch.first) & (frame[own] <= stretch.last)]
+        own = change.detections[change.stretch_of == i]
         middle = int(own[len(own) // 2])
         is_taken = any(
             each.is_asked and each.target == stretch.source and each.first <= stretch.last

@@ -12,8 +12,8 @@ __all__ = ["Edit", "EditKind"]
 
 EditKind = Literal["same", "different", "cut", "clutter", "name", "fill", "no_fill", "reassign"]
 
-N_DETECTIONS = {"clutter": 1, "name": 1, "reassign": 0}
-"""Number of detections of an edit, where it is not two."""
+N_DETECTIONS = {"clutter": 1, "name": 1, "reassign": None}
+"""Number of detections of an edit, where it is not two; None for any number."""
 
 
 @record
@@ -27,8 +27,8 @@ class Edit:
         follow each other in a track and are not of one marker, and the track is parted exactly
         there. ``clutter``: the detection is a false alarm. ``name``: it is of the marker `name`.
         ``fill``, ``no_fill``: the gap between both detections is filled, or is left open.
-        ``reassign``: about no detection; all uncertain ones are assigned once more, given the
-        tracks as the earlier edits have corrected them.
+        ``reassign``: all uncertain detections are assigned once more, given the tracks as the
+        earlier edits have corrected them; those of the edit stay, now and in later ones.
     at : tuple of (int, int)
         Frame of each detection, counted from 0, and its number among the points of that frame.
     name : str
@@ -64,7 +64,7 @@ class Edit:
             raise ParameterError("kind", " or ".join(get_args(EditKind)), repr(self.kind))
         n = N_DETECTIONS.get(self.kind, 2)
         at = tuple((frame, point) for frame, point in self.at)
-        if len(at) != n:
+        if n is not None and len(at) != n:
             expected = f"{n} detection{'s' * (n != 1)} for {self.kind!r}"
             raise ParameterError("at", expected, f"{len(at)}")
         for number in (number for each in at for number in each):

@@ -63,7 +63,7 @@ export class Changes {
   /** List the edits, the last one first. */
   list(edits) {
     const items = edits.map(({ kind, at, name }) => {
-      const places = at.map(([frame, point]) => `frame ${frame} point ${point}`).join(", ");
+      const places = kind === "reassign" ? (at.length ? `without ${counted(at.length, "point")}` : "") : at.map(([frame, point]) => `frame ${frame} point ${point}`).join(", ");
       return make("li", {}, `${WORDS[kind]} `, name ? named(name) : "", ` ${places}`);
     });
     byId("edit-list").replaceChildren(...items.reverse().slice(0, 200));

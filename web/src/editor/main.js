@@ -79,7 +79,7 @@ class Editor {
       z: (event) => (event.shiftKey ? act.redo : act.undo)(), y: act.redo, b: act.save,
       r: () => this.attempt(() => this.changes.take()), "?": act.keys,
     });
-    for (let n = 1; n <= 9; n++) keys[n] = () => decisions.choose(n);
+    for (let n = 1; n <= 9; n++) keys[n] = () => (this.leave ? this.leave(n - 1) : decisions.choose(n));
     keys.Enter = () => this.confirm?.();
     const escape = keys.Escape;
     keys.Escape = (event) => {
@@ -194,7 +194,7 @@ class Editor {
   /** Show how the gap of the selected track would be filled; null for nothing. */
   async preview(gap) {
     if (gap === null) {
-      this.filling = this.confirm = null;
+      this.filling = this.confirm = this.leave = null;
       if (this.overlay) this.overlay.fill = null;
       byId("filling").replaceChildren();
       return;
@@ -223,20 +223,40 @@ class Editor {
     this.preview(null);
     const answer = await this.send("preview_reassign");
     if (!answer) return;
-    const { stretches } = answer;
+    const { stretches, version } = answer;
     if (!stretches.length) {
       byId("filling").replaceChildren(make("p", {}, "Assigned again, no point would change."));
       return;
     }
-    const n = stretches.reduce((sum, each) => sum + each.n_detections, 0);
+    const groups = grouped(stretches);
+    const left = new Set();
+    const about = make("p", {});
+    const count = () => {
+      const n = stretches.reduce((sum, each) => sum + (left.has(each.group) ? 0 : each.n_detections), 0);
+      about.textContent = `Assigned again, ${counted(n, "point")} would change:`;
+    };
+    const rows = groups.map((group, i) => {
+      const toggle = button("Leave out", i < 9 ? `${i + 1}` : "", () => this.leave(i));
+      toggle.ariaPressed = "false";
+      return make("li", {}, this.changes.listed(group), toggle);
+    });
+    this.leave = (i) => {
+      if (i >= groups.length) return;
+      const { group } = groups[i][0];
+      if (!left.delete(group)) left.add(group);
+      rows[i].classList.toggle("omitted", left.has(group));
+      rows[i].querySelector("button").ariaPressed = `${left.has(group)}`;
+      count();
+    };
     this.confirm = () => {
       this.preview(null);
-      this.send("reassign");
+      this.send("reassign", { version, without: [...left] });
     };
+    count();
     byId("filling").replaceChildren(
-      make("p", {}, `Assigned again, ${counted(n, "point")} would change:`),
-      this.changes.listed([...stretches].sort((a, b) => b.n_detections - a.n_detections)),
+      about,
       make("div", { className: "tools" }, button("Confirm", "Enter", this.confirm), button("Dismiss", "Esc", () => this.preview(null))),
+      make("ol", { className: "offered" }, ...rows),
     );
   }
 
@@ -282,6 +302,15 @@ class Editor {
     byId("edit-undo").disabled = !n;
     byId("edit-redo").disabled = !this.n_undone;
   }
+}
+
+/** The stretches that only change together, those with the most points first. */
+function grouped(stretches) {
+  const groups = new Map();
+  for (const each of stretches) groups.set(each.group, [...(groups.get(each.group) ?? []), each]);
+  const size = (group) => group.reduce((sum, each) => sum + each.n_detections, 0);
+  for (const group of groups.values()) group.sort((a, b) => b.n_detections - a.n_detections);
+  return [...groups.values()].sort((a, b) => size(b) - size(a));
 }
 
 function button(text, key, act) {

@@ -21,7 +21,7 @@ __all__ = ["PANEL", "editing_keys", "editing_of", "numbers_of", "tile"]
 
 _KEYS = {
     "N, P": "next and previous uncertain decision",
-    "1 … 9": "choose the answer with that number",
+    "1 … 9": "choose the answer with that number; leave out that change of a preview",
     "X": "exchange two selected tracks from this frame on",
     "J": "join two selected tracks, or a point and a track",
     "U": "select the next point of clutter in this frame",

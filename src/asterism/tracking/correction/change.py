@@ -32,6 +32,9 @@ class Stretch:
         Number of detections.
     is_asked : bool
         Whether a detection of the edit is among them; other stretches follow from it.
+    group : int
+        Number that is the same for stretches of which one takes the place of another in a frame,
+        so that neither is possible alone. It is the number of the first of them.
     """
 
     first: int
@@ -40,6 +43,7 @@ class Stretch:
     target: int
     n_detections: int
     is_asked: bool
+    group: int
 
 
 @record(eq=False)
@@ -54,6 +58,8 @@ class Change:
         Detections whose track changed, rising.
     before, after : ndarray of int, shape (n,)
         Their tracks before and after the edit, -1 for clutter.
+    stretch_of : ndarray of int, shape (n,)
+        Stretch of each.
     stretches : tuple of Stretch
         The same by stretches of time.
     names : dict of int to tuple of (str or None)
@@ -64,11 +70,17 @@ class Change:
     detections: NDArray[np.int64]
     before: NDArray[np.int64]
     after: NDArray[np.int64]
+    stretch_of: NDArray[np.int64]
     stretches: tuple[Stretch, ...]
     names: dict[int, tuple[str | None, str | None]]
 
     def __repr__(self) -> str:
         return f"Change({self.edit.kind}: {len(self.detections)} detections)"
+
+    def of_groups(self, groups: Sequence[int]) -> NDArray[np.int64]:
+        """Return the detections of all stretches of some groups, rising."""
+        group = np.array([each.group for each in self.stretches], dtype=np.int64)
+        return self.detections[np.isin(group[self.stretch_of], groups)]
 
 
 def change_of(
@@ -96,27 +108,63 @@ def change_of(
     changed = np.flatnonzero(labels[0] != labels[1])
     before, after = labels[0][changed], labels[1][changed]
     frame = frame_of[changed]
-    stretches: list[Stretch] = []
+    runs: list[NDArray[np.int64]] = []
     for source, target in dict.fromkeys(zip(before.tolist(), after.tolist(), strict=True)):
         which = np.flatnonzero((before == source) & (after == target))
-        stretches += [
-            Stretch(
-                first=int(frame[run[0]]), last=int(frame[run[-1]]), source=source,
-                target=target, n_detections=len(run),
-                is_asked=bool(np.isin(changed[run], own).any()),
-            )
-            for run in np.split(which, _breaks(changed[which], source, target, labels))
-        ]  # fmt: skip
-    stretches.sort(key=lambda each: (not each.is_asked, each.first, each.source))
+        runs += np.split(which, _breaks(changed[which], source, target, labels))
+    is_asked = np.isin(changed, own)
+    runs.sort(key=lambda run: (not is_asked[run].any(), frame[run[0]], before[run[0]]))
+    stretch_of = np.empty(len(changed), dtype=np.int64)
+    for i, run in enumerate(runs):
+        stretch_of[run] = i
+    groups = _groups(stretch_of, frame, before, after)
     old = [*names[0], *[None] * (len(names[1]) - len(names[0]))]
     return Change(
-        edit=edit, detections=changed, before=before, after=after, stretches=tuple(stretches),
+        edit=edit, detections=changed, before=before, after=after, stretch_of=stretch_of,
+        stretches=tuple(
+            Stretch(
+                first=int(frame[run[0]]), last=int(frame[run[-1]]), source=int(before[run[0]]),
+                target=int(after[run[0]]), n_detections=len(run),
+                is_asked=bool(is_asked[run].any()), group=group,
+            )
+            for run, group in zip(runs, groups, strict=True)
+        ),
         names={
             k: (one, other)
             for k, (one, other) in enumerate(zip(old, names[1], strict=True))
             if one != other
         },
     )  # fmt: skip
+
+
+def _groups(
+    stretch_of: NDArray[np.int64],
+    frame: NDArray[np.int64],
+    before: NDArray[np.int64],
+    after: NDArray[np.int64],
+) -> list[int]:
+    """Return the group of each stretch: those that take the place of each other in a frame."""
+    groups = list(range(int(stretch_of.max(initial=-1)) + 1))
+
+    def first(stretch: int) -> int:
+        while groups[stretch] != stretch:
+            stretch = groups[stretch]
+        return stretch
+
+    n_tracks = int(max(before.max(initial=-1), after.max(initial=-1))) + 1
+    left, taken = np.flatnonzero(before >= 0), np.flatnonzero(after >= 0)
+    places = frame[left] * n_tracks + before[left]
+    left = left[np.argsort(places, kind="stable")]
+    places = np.sort(places)
+    place = frame[taken] * n_tracks + after[taken]
+    at = np.searchsorted(places, place)
+    is_same = at < len(places)
+    is_same[is_same] = places[at[is_same]] == place[is_same]
+    pairs = np.stack([stretch_of[taken[is_same]], stretch_of[left[at[is_same]]]], axis=1)
+    for one, other in np.unique(pairs, axis=0).tolist():
+        low, high = sorted((first(one), first(other)))
+        groups[high] = low
+    return [first(i) for i in range(len(groups))]
 
 
 def _breaks(

@@ -71,6 +71,7 @@ class Constraints:
         self._apart: dict[tuple[int, int], Edit] = {}
         self._clutter: dict[int, Edit] = {}
         self._names: dict[str, int] = {}
+        self._kept: set[int] = set()
 
     @classmethod
     def of(cls, edits: Iterable[Edit], detections: Detections) -> Constraints:
@@ -102,6 +103,11 @@ class Constraints:
     def clutter(self) -> frozenset[int]:
         """Detections that are clutter."""
         return frozenset(self._clutter)
+
+    @property
+    def kept(self) -> frozenset[int]:
+        """Detections that no assignment of all uncertain ones changes."""
+        return frozenset(self._kept)
 
     @property
     def named(self) -> dict[str, int]:
@@ -145,6 +151,8 @@ class Constraints:
             if own[0] in self._root:
                 self._refuse(edit, self._about(own[0]))
             self._clutter[own[0]] = edit
+        elif edit.kind == "reassign":
+            self._kept.update(own)
         self.edits += (edit,)
 
     def _join(self, one: int, other: int, edit: Edit) -> None:

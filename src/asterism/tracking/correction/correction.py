@@ -49,7 +49,7 @@ class Correction:
     >>> correction = am.tracking.Correction(truth, model)
     >>> change = correction.apply(Edit(kind="clutter", at=((0, 0),)))
     >>> change.stretches
-    (Stretch(first=0, last=39, source=0, target=-1, n_detections=40, is_asked=True),)
+    (Stretch(first=0, last=39, source=0, target=-1, n_detections=40, is_asked=True, group=0),)
     >>> correction.undo().edit == change.edit, correction.undo() is None
     (True, True)
     """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +15,7 @@ from asterism.tracking.correction.constraints import Constraints, detections_of
 from asterism.tracking.correction.continuation import continuation
 from asterism.tracking.correction.evidence import Evidence
 from asterism.tracking.correction.exchange import Lane, Motion, best_exchange
+from asterism.tracking.correction.segments import with_lost_segments
 from asterism.tracking.correction.settled import settled
 
 if TYPE_CHECKING:
@@ -32,7 +34,7 @@ CLUTTER = -2
 """Label, while an edit is solved, of the detections without a track that one of them begins."""
 TRACKED = 3.0
 """Log odds of a detection that continues a track being of its marker instead of clutter."""
-MAX_SHARED = 0.02
+MAX_SHARED = 0.1
 """Largest share of the frames of a track that a track of the same marker may have too."""
 
 
@@ -94,7 +96,7 @@ class Solver:
         elif edit.kind == "name":
             self._call(own[0], edit.name)
         elif edit.kind == "reassign":
-            self._reassign()
+            self._reassign(own)
         if edit.kind in ("same", "name"):
             self._collect(int(self.labels[own[0]]))
 
@@ -160,7 +162,8 @@ class Solver:
     def _drop(self, detection: int) -> None:
         """Make the part of a detection clutter.
 
-        Detections that no tracklet had are a part as far as they follow each other in the track.
+        Detections that no tracklet had are a part as far as they follow each other in the track. If
+        the part keeps the distances of its track and the detection does not, it is dropped alone.
         """
         track = int(self.labels[detection])
         if track < 0:
@@ -171,6 +174,10 @@ class Solver:
             runs = np.cumsum(~is_in)
             is_in &= runs == runs[np.searchsorted(own, detection)]
         own = own[is_in]
+        unknown = len(self.names)
+        gain = self.evidence.gains(own, np.zeros_like(own), self.labels, [unknown])[0].sum()
+        if self._fits_alone(detection, gain, unknown):
+            own = np.array([detection])
         pinned = np.isin(own, list(self._constraints.pinned))
         frame = self._d.frame_of
         low = frame[own[pinned & (own < detection)]].max(initial=-1)
@@ -225,10 +232,12 @@ class Solver:
         """
         if not self._may_be(detection, target):
             return None
-        if lanes is None:
-            lanes = self._lanes(source, [target], self.labels)[target]
-            if source != CLUTTER and self._is_in_mixed_part(detection, lanes[0], target):
-                part = int(self.evidence.part_of[detection])
+        is_new = target == len(self.names)
+        if lanes is None or is_new:
+            lanes = lanes or self._lanes(source, [target], self.labels)[target]
+            part = int(self.evidence.part_of[detection])
+            gain = lanes[0].gains[self.evidence.part_of[lanes[0].detections] == part].sum()
+            if source != CLUTTER and self._fits_alone(detection, gain, target):
                 lanes = self._track_lanes(source, [target], self.labels, part)[0], lanes[1]
         group = self._constraints.group(detection)
         both = group if beside is None else {*group, beside}
@@ -246,14 +255,13 @@ class Solver:
             for lane, then in zip(lanes, (target, source), strict=True)
         ]
 
-    def _is_in_mixed_part(self, detection: int, lane: Lane, target: int) -> bool:
-        """Return whether a detection fits another track that its part does not fit."""
-        parts = self.evidence.part_of
-        part = parts[detection]
-        if lane.gains[parts[lane.detections] == part].sum() >= 0:
-            return False
+    def _fits_alone(self, detection: int, gain: float, target: int) -> bool:
+        """Return whether a detection fits another track that its part does not fit.
+
+        The gain is that of the part.
+        """
         own = np.array([detection])
-        return bool(self.evidence.gains(own, parts[own], self.labels, [target])[0, 0] > 0)
+        return gain < 0 < self.evidence.gains(own, own, self.labels, [target])[0, 0]
 
     def _lanes(
         self, source: int, targets: Sequence[int], labels: NDArray[np.int64]
@@ -341,18 +349,23 @@ class Solver:
         _, first = np.unique(frame[others], return_index=True)  # the most probable of each frame
         labels[others[first]] = track
 
-    def _reassign(self) -> None:
-        """Assign the uncertain detections and those without a track once more."""
+    def _reassign(self, kept: Sequence[int]) -> None:
+        """Assign the uncertain detections and those without a track once more, without some."""
         tracks = Tracks(detections=self._d, labels=self.labels, names=tuple(self.names))
         assessed = settled(
             assess(tracks, self._model, self._stitching), self._constraints.edits
         ).identity_confidence
         assert assessed is not None
-        is_open = (self.labels >= 0) & (assessed < UNCERTAIN)
-        is_open[list(self._constraints.pinned)] = False
-        self.labels = reassigned(
-            tracks, is_open | self._free(), self.evidence.ghost, self._model.sensor.noise_sigma
-        )
+        is_open = (self.labels >= 0) & (assessed < UNCERTAIN) | self._free()
+        is_open[[*self._constraints.pinned, *self._constraints.kept, *kept]] = False
+        labels, is_placed = with_lost_segments(tracks, is_open)
+        tracks, is_open = replace(tracks, labels=labels), is_open & ~is_placed
+        labels = reassigned(tracks, is_open, self.evidence.ghost, self._model.sensor.noise_sigma)
+        # Without distances at its best, a marker is no clutter: its identity must be improbable.
+        slots = self._d.frame_of * len(self.names)
+        is_back = (self.labels >= 0) & (labels < 0) & (assessed > 1 - UNCERTAIN)
+        is_back &= ~np.isin(slots + self.labels, (slots + labels)[labels >= 0])
+        self.labels = np.where(is_back, self.labels, labels)
 
     def _free(self) -> NDArray[np.bool_]:
         """Return which detections have no track, without those that an edit is about.
@@ -363,6 +376,8 @@ class Solver:
         free, parts = self.labels < 0, self.evidence.part_of
         free[stated] = False
         ghosts = {int(parts[i]) for i in self._constraints.clutter} - {-1}
+        if ghosts:  # a part of which some detections are of a track is no ghost
+            ghosts -= set(parts[np.isin(parts, list(ghosts)) & (self.labels >= 0)].tolist())
         return free & ~np.isin(parts, list(ghosts)) if ghosts else free
 
 
