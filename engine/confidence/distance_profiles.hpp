@@ -8,6 +8,10 @@
 //   d    distance of the part to another track, the median of a few frames
 //   m, s median and spread of that distance in a profile
 //   log density: Student's t of (d - m) / s, in the mean over the steadiest distances
+//
+// Posture changes some distances by many spreads for seconds, as those of a shoulder to a hand. An
+// unknown marker is therefore compared by the range of most deviations, with weights by how much a
+// range differs from that of an unknown marker.
 #pragma once
 
 #include <algorithm>
@@ -121,7 +125,9 @@ class DistanceProfiles {
   static constexpr double kMaxPresent = 0.2;  // share of a part in which an alternative is present
 
   struct Distance {
-    double median = kNone, spread = 0;
+    double median = kNone;
+    double spread = 0;  // from the median deviation
+    double range = 0;   // from the deviation that `kMost` of all do not exceed
     bool is_known() const { return median >= 0; }
   };
   // Medians of a distance that is not known, of one that has not been computed, and of one of which
@@ -138,21 +144,30 @@ class DistanceProfiles {
       if (const Distance* own = steady(part.track, r)) steady_.push_back({own->spread, r});
     }
     if (steady_.size() < kMinNeighbours) return false;
-    const std::size_t n = std::min(steady_.size(), kNeighbours);
-    std::partial_sort(steady_.begin(), steady_.begin() + static_cast<std::ptrdiff_t>(n),
-                      steady_.end());
-    steady_.resize(n);
+    ranges_.clear();
+    for (const auto& [spread, r] : steady_) ranges_.push_back({distance(part.track, r).range, r});
+    keep_steadiest(steady_);
+    keep_steadiest(ranges_);
     return true;
   }
-  // Log density of the chosen distances for an unknown marker, relative to the own track.
+  using BySpread = std::vector<std::pair<double, std::size_t>>;
+  static void keep_steadiest(BySpread& all) {
+    const std::size_t n = std::min(all.size(), kNeighbours);
+    std::partial_sort(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(n), all.end());
+    all.resize(n);
+  }
+  // Log density of the distances of the smallest ranges for an unknown marker, relative to the own
+  // track.
   double unknown(std::int32_t own) {
-    double of_own = 0, of_unknown = 0;
-    for (const auto& [spread, r] : steady_) {
+    double sum = 0, weights = 0;
+    for (const auto& [range, r] : ranges_) {
       const double off = distances_[r] - distance(own, r).median;
-      of_own += log_t(off, spread);
-      of_unknown += log_t(off, std::hypot(spread, kUnknownSpread));
+      const double of_unknown = std::hypot(range, kUnknownSpread);
+      const double weight = std::log(of_unknown / range);
+      sum += weight * (log_t(off, of_unknown) - log_t(off, range));
+      weights += weight;
     }
-    return (of_unknown - of_own) / static_cast<double>(steady_.size());
+    return sum / weights;
   }
   // Log density of the chosen distances by the profile of another track, relative to the own; -inf
   // without enough of them.
@@ -311,6 +326,13 @@ class DistanceProfiles {
     for (double& value : values) value = std::abs(std::sqrt(value) - found.median);
     const double spread = kOfNormal * median_of(values);
     found.spread = std::sqrt(spread * spread + least);
+    // The values beyond the median are behind it.
+    const auto most = values.begin() + static_cast<std::ptrdiff_t>(
+                                           kMost * static_cast<double>(values.size() - 1));
+    std::nth_element(values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), most,
+                     values.end());
+    const double range = kOfMost * *most;
+    found.range = std::sqrt(range * range + least);
     return found;
   }
   // Whether too few of the squared distances are near their median for a steady distance. `least` is
@@ -353,6 +375,7 @@ class DistanceProfiles {
   }
 
   static constexpr double kOfNormal = 1.4826;  // standard deviation per median deviation
+  static constexpr double kMost = 0.8, kOfMost = 0.7803;  // and per deviation of that rank
 
   LabelledFrames all_;
   double floor2_;
@@ -367,7 +390,7 @@ class DistanceProfiles {
   std::size_t n_measured_ = 0;
   std::vector<double> values_, distances_, n_present_;
   std::vector<std::ptrdiff_t> counts_;
-  std::vector<std::pair<double, std::size_t>> steady_;
+  BySpread steady_, ranges_;
 };
 
 }  // namespace asterism

@@ -8,6 +8,7 @@ SAMPLES, REFERENCES, PART_FRAMES, NEIGHBOURS = 160, 128, 8, 6
 MIN_FRAMES, MIN_NEIGHBOURS, ALTERNATIVES = 6, 2, 3
 MIN_NOISE, BEND, STEADY, UNKNOWN_SPREAD = 1e-3, 0.02, 0.1, 0.1
 SAME, MAX_PRESENT = -0.5, 0.2
+MOST, OF_MOST = 0.8, 0.7803
 
 
 def compare_part(positions, noise, track, frames, partners):
@@ -39,12 +40,12 @@ def compare_part(positions, noise, track, frames, partners):
     steady = [r for _, _, r in steady[:NEIGHBOURS]]
     if len(steady) < MIN_NEIGHBOURS:
         return False, 0.0, []
-    off = {r: distances[r] - own[r][0] for r in steady}
-    unknown = np.mean(
-        [
-            _log_t(off[r], np.hypot(own[r][1], UNKNOWN_SPREAD)) - _log_t(off[r], own[r][1])
-            for r in steady
-        ]
+    off = {r: distances[r] - own[r][0] for r in distances}
+    ranges = sorted((own[r][2], order[r], r) for r in distances if own[r][1] < STEADY)
+    of_own, apart = np.array([(s, off[r]) for s, _, r in ranges[:NEIGHBOURS]]).T
+    of_unknown = np.hypot(of_own, UNKNOWN_SPREAD)
+    unknown = np.average(
+        _log_t(apart, of_unknown) - _log_t(apart, of_own), weights=np.log(of_unknown / of_own)
     )
     others = []
     for k in range(n_tracks):
@@ -85,7 +86,7 @@ def samples_of(positions):
 
 
 def profile_of(positions, noise, k):
-    """Return the median and spread of the distance of a track to each reference that has one."""
+    """Return median, spread and range of the distance of a track to each reference that has one."""
     found, is_present = {}, np.isfinite(positions[:, :, 0])
     for r in references_of(positions):
         both = [t for t in samples_of(positions) if is_present[t, k] and is_present[t, r]]
@@ -93,9 +94,10 @@ def profile_of(positions, noise, k):
             continue
         values = np.linalg.norm(positions[both, k] - positions[both, r], axis=1)
         median = _upper_median(values)
-        spread = 1.4826 * _upper_median(abs(values - median))
+        off = np.sort(abs(values - median))
+        spread, most = 1.4826 * _upper_median(off), OF_MOST * off[int(MOST * (len(off) - 1))]
         floor = 2 * max(noise, MIN_NOISE) ** 2 + (BEND * median) ** 2
-        found[r] = median, np.sqrt(spread**2 + floor)
+        found[r] = median, np.sqrt(spread**2 + floor), np.sqrt(most**2 + floor)
     return found
 
 
@@ -104,7 +106,7 @@ def log_ratio_to_unknown(distances, profile):
 
     It is the mean over the steadiest ones, None where there are too few.
     """
-    steady = sorted((s, i, r) for i, (r, (_, s)) in enumerate(profile.items()) if s < STEADY)
+    steady = sorted((s, i, r) for i, (r, (_, s, _)) in enumerate(profile.items()) if s < STEADY)
     used = [r for _, _, r in steady if r in distances][:NEIGHBOURS]
     if len(used) < MIN_NEIGHBOURS:
         return None

@@ -26,7 +26,7 @@ __all__ = [
 
 EXCHANGE = (-1.54, 0.21, 0.76)
 """Log odds of an exchange: constant, factor of its log-likelihood ratio, and of both links."""
-PART = (-1.46, 0.93, 0.64, 0.31, 0.28)
+PART = (-1.90, 1.30, 0.50, 0.32, 0.24)
 """Log odds that a part is on the marker of its track: constant, and the factors of the margins of
 its distances over an unknown marker and over the best other track, of the log odds of the less
 certain link or join at its ends, and of the logarithm of its number of detections."""
@@ -37,7 +37,7 @@ WHOLE = 0.9999
 """Largest probability of an identity."""
 RATIOS = (-10.0, 10.0)
 """Bounds of the log-likelihood ratio of an exchange."""
-MARGINS = (-2.0, 4.0)
+MARGINS = (-4.0, 4.0)
 """Bounds of the margins."""
 EVEN = 1e-4
 """Smallest probability whose log odds are used, and its complement."""

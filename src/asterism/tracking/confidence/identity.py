@@ -245,12 +245,17 @@ def _probability(parts: Parts, evidence: Evidence, n_tracks: int) -> NDArray[np.
 
 
 def _chained(parts: Parts, n_tracks: int) -> NDArray[np.float64]:
-    """Return the product of the links between each part and the longest part of its track."""
+    """Return the probability that each part is on the marker of the longest part of its track.
+
+    It is the product of the links between both, and of the probability that the longest one is of
+    one marker.
+    """
     logs = np.cumsum(np.log(np.maximum(parts.before, 1e-12)))
     longest = np.zeros(n_tracks, dtype=np.int64)
     order = np.argsort(parts.n_detections, kind="stable")
     longest[parts.track[order]] = order  # the last assignment is of the longest part
-    return np.exp(-np.abs(logs - logs[longest[parts.track]]))
+    other = longest[parts.track]
+    return np.exp(-np.abs(logs - logs[other])) * track_probability(parts.n_detections[other])
 
 
 def _decisions(tracks: Tracks, found: Examined, probability: NDArray[np.float64]) -> list[Decision]:
