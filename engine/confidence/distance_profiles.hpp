@@ -10,8 +10,8 @@
 //   log density: Student's t of (d - m) / s, in the mean over the steadiest distances
 //
 // Posture changes some distances by many spreads for seconds, as those of a shoulder to a hand. An
-// unknown marker is therefore compared by the range of most deviations, with weights by how much a
-// range differs from that of an unknown marker.
+// unknown marker is therefore compared a second time by the range of most deviations, with weights
+// by how much a range differs from that of an unknown marker.
 #pragma once
 
 #include <algorithm>
@@ -51,16 +51,13 @@ class DistanceProfiles {
         steady_.push_back({std::hypot(of_a.spread, of_b.spread), r});
     }
     if (steady_.size() < kMinAgreeing) return -std::numeric_limits<double>::infinity();
-    const std::size_t n = std::min(steady_.size(), kNeighbours);
-    std::partial_sort(steady_.begin(), steady_.begin() + static_cast<std::ptrdiff_t>(n),
-                      steady_.end());
+    keep_steadiest(steady_);
     double sum = 0;
-    for (std::size_t i = 0; i < n; ++i) {
-      const auto& [spread, r] = steady_[i];
+    for (const auto& [spread, r] : steady_) {
       const double off = distance(a, r).median - distance(b, r).median;
       sum += log_t(off, spread) - log_t(off, std::hypot(spread, kUnknownSpread));
     }
-    return sum / static_cast<double>(n);
+    return sum / static_cast<double>(steady_.size());
   }
 
   PartEvidence compare(const TrackPart& part) {
@@ -68,6 +65,7 @@ class DistanceProfiles {
     if (!choose_steady(part)) return found;
     found.is_known = true;
     found.unknown = unknown(part.track);
+    found.in_range = unknown_in_range(part.track);
     for (std::int32_t k = 0; k < static_cast<std::int32_t>(all_.n_tracks); ++k) {
       if (k == part.track) continue;
       const bool is_partner = std::ranges::find(part.partners, k) != part.partners.end();
@@ -156,9 +154,18 @@ class DistanceProfiles {
     std::partial_sort(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(n), all.end());
     all.resize(n);
   }
-  // Log density of the distances of the smallest ranges for an unknown marker, relative to the own
-  // track.
+  // Log density of the chosen distances for an unknown marker, relative to the own track.
   double unknown(std::int32_t own) {
+    double of_own = 0, of_unknown = 0;
+    for (const auto& [spread, r] : steady_) {
+      const double off = distances_[r] - distance(own, r).median;
+      of_own += log_t(off, spread);
+      of_unknown += log_t(off, std::hypot(spread, kUnknownSpread));
+    }
+    return (of_unknown - of_own) / static_cast<double>(steady_.size());
+  }
+  // The same by the ranges of the distances.
+  double unknown_in_range(std::int32_t own) {
     double sum = 0, weights = 0;
     for (const auto& [range, r] : ranges_) {
       const double off = distances_[r] - distance(own, r).median;

@@ -16,8 +16,8 @@ def compare_part(positions, noise, track, frames, partners):
 
     The positions have shape (T, K, D), NaN where a track has no detection.
 
-    Returns whether the distances are known, the log density of an unknown marker, and up to three
-    (log density, track), all relative to the own track.
+    Returns whether the distances are known, the log density of an unknown marker, the same by
+    ranges, and up to three (log density, track), all relative to the own track.
     """
     n_tracks = positions.shape[1]
     is_present = np.isfinite(positions[:, :, 0])
@@ -39,12 +39,18 @@ def compare_part(positions, noise, track, frames, partners):
     steady = sorted((own[r][1], order[r], r) for r in distances if own[r][1] < STEADY)
     steady = [r for _, _, r in steady[:NEIGHBOURS]]
     if len(steady) < MIN_NEIGHBOURS:
-        return False, 0.0, []
+        return False, 0.0, 0.0, []
     off = {r: distances[r] - own[r][0] for r in distances}
+    unknown = np.mean(
+        [
+            _log_t(off[r], np.hypot(own[r][1], UNKNOWN_SPREAD)) - _log_t(off[r], own[r][1])
+            for r in steady
+        ]
+    )
     ranges = sorted((own[r][2], order[r], r) for r in distances if own[r][1] < STEADY)
     of_own, apart = np.array([(s, off[r]) for s, _, r in ranges[:NEIGHBOURS]]).T
     of_unknown = np.hypot(of_own, UNKNOWN_SPREAD)
-    unknown = np.average(
+    in_range = np.average(
         _log_t(apart, of_unknown) - _log_t(apart, of_own), weights=np.log(of_unknown / of_own)
     )
     others = []
@@ -70,7 +76,8 @@ def compare_part(positions, noise, track, frames, partners):
             ]
         )
         others.append((float(density), k))
-    return True, float(unknown), sorted(others, key=lambda one: (-one[0], one[1]))[:ALTERNATIVES]
+    best = sorted(others, key=lambda one: (-one[0], one[1]))[:ALTERNATIVES]
+    return True, float(unknown), float(in_range), best
 
 
 def references_of(positions):
