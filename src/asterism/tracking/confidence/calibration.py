@@ -45,8 +45,8 @@ RATIOS = (-10.0, 10.0)
 MARGINS = (-2.0, 4.0)
 """Bounds of the margins for `PART`."""
 IN_RANGE = (-6.0, 4.0)
-"""Bounds of the margins for `IDENTITY`. An exchange for a third of a track widens its ranges, so that
-only the other track shows it."""
+"""Bounds of the margins for `IDENTITY`. An exchange for a third of a track widens its ranges, so
+that only the other track shows it."""
 EVEN = 1e-4
 """Smallest probability whose log odds are used, and its complement."""
 

@@ -267,9 +267,7 @@ def _joins(tracks: Tracks, stitching: Stitching) -> tuple[NDArray[np.int64], NDA
     return then, p
 
 
-def _probability(
-    found: Examined, known: NDArray[np.float64], n_tracks: int
-) -> NDArray[np.float64]:
+def _probability(found: Examined, known: NDArray[np.float64], n_tracks: int) -> NDArray[np.float64]:
     """Return the probability that each part is on the marker of its track.
 
     Those with enough distances have the one that is `known` by them.
