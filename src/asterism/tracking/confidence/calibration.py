@@ -31,7 +31,7 @@ PART = (-1.46, 0.93, 0.64, 0.31, 0.28)
 """Log odds that a part is on the marker of its track: constant, and the factors of the margins of
 its distances over an unknown marker and over the best other track, of the log odds of the less
 certain link or join at its ends, and of the logarithm of its number of detections."""
-IDENTITY = (-1.90, 1.30, 0.50, 0.32, 0.24)
+IDENTITY = (-1.93, 1.22, 0.52, 0.31, 0.29)
 """The same with the margin over an unknown marker by ranges. It is less often wrong about right
 parts, and finds fewer wrong ones where a track is on several markers, as before the last
 assignment: attempts are compared by `PART`, and the confidence is stated by `IDENTITY`."""
