@@ -117,17 +117,20 @@ def tracked(
 
 def parts_of(
     found: Examined, tracks: am.Tracks, truth: am.Tracks
-) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-    """Return features, and whether each is right, of the parts and of the whole tracks."""
+) -> tuple[tuple[Array, Array], tuple[Array, Array], tuple[Array, Array]]:
+    """Return features, and whether each is right, of the parts, in ranges, and of whole tracks."""
     parts, evidence = found.parts, found.evidence
     is_whole = parts.is_whole(tracks.n_tracks)
     used = evidence.is_known & ~is_whole
     wrong = is_wrong(tracks, truth)[tracks.by_track[0]]
     share = 1 - np.add.reduceat(wrong, parts.offsets[:-1]) / parts.n_detections
     right = (share > 0.5).astype(float)
-    features = calibration.part_features(evidence, parts.weakest, parts.n_detections)
+    features, in_range = (
+        calibration.part_features(evidence, parts.weakest, parts.n_detections, in_range=each)[used]
+        for each in (False, True)
+    )
     whole = calibration.track_features(parts.n_detections[is_whole])
-    return (features[used], right[used]), (whole, right[is_whole])
+    return (features, right[used]), (in_range, right[used]), (whole, right[is_whole])
 
 
 def exchanges_of(found: Examined, truth: am.Tracks) -> tuple[Array, Array]:
@@ -207,6 +210,7 @@ def main() -> None:
     parser.add_argument("--markdown", type=Path)
     options = parser.parse_args()
     parts: list[tuple[Array, Array]] = []
+    identities: list[tuple[Array, Array]] = []
     whole: list[tuple[Array, Array]] = []
     exchanges: list[tuple[Array, Array]] = []
     reliability: dict[str, Reliability] = {}
@@ -214,11 +218,12 @@ def main() -> None:
         # Further attempts are chosen by the confidence that is fitted here.
         tracks, model, stitching = tracked(truth, retry=False)
         found = examine(tracks, model, stitching)
-        of_parts, of_tracks = parts_of(found, tracks, truth)
+        of_parts, in_range, of_tracks = parts_of(found, tracks, truth)
         whole.append(of_tracks)
         if name.endswith(VISITS):
             continue
         parts.append(of_parts)
+        identities.append(in_range)
         exchanges.append(exchanges_of(found, truth))
         own = reliability.setdefault("simulated people", Reliability())
         own.add(am.tracking.assess(tracks, model, stitching), truth)
@@ -229,6 +234,7 @@ def main() -> None:
     fitted = {
         "EXCHANGE": fit(*_together(exchanges), np.ones(sum(len(right) for _, right in exchanges))),
         "PART": fit(*_together(parts), 1 / counts),
+        "IDENTITY": fit(*_together(identities), 1 / counts),
         "TRACK": fit(*_together(whole), np.ones(sum(len(right) for _, right in whole))),
     }
     for name, values in fitted.items():

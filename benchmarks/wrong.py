@@ -5,11 +5,13 @@ track holds under another label is an error of the file in three cases. All mark
 within millimetres of each other, so that nothing shows which is which. Or the motion of the track
 is continuous at the ends of the run from one frame to the next, where the labels of the file jump;
 at deviations of centimetres the distances must favour the track too. Or the distances to the other
-labels are clearly those of the marker of the track, not those of the label.
+labels are clearly those of the marker of the track, not those of the label. A run is judged as a
+whole, and then each stretch of it under one label.
 """
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
@@ -70,16 +72,24 @@ def wrong_runs(tracks: am.Tracks, truth: am.Tracks) -> list[Run]:
     for k in range(tracks.n_tracks):
         own = order[offsets[k] : offsets[k + 1]]
         inside = own[named[own]]
-        for begin, end in _runs(wrong[inside]):
-            marker = int(np.bincount(truth.labels[inside]).argmax())
-            error = labels.is_error(inside, begin, end, marker)
-            run = inside[begin:end]
-            kind = "label error" if error else "switch"
-            found.append(Run(k, int(frame[run[0]]), int(frame[run[-1]]), kind, run))
+        marker = int(np.bincount(truth.labels[inside]).argmax()) if len(inside) else -1
+        for whole in _runs(wrong[inside]):
+            pieces = [whole]
+            if not labels.is_error(inside, *whole, marker):
+                pieces = _of_one_label(truth.labels[inside], *whole)
+            for begin, end in pieces:
+                kind = "label error" if labels.is_error(inside, begin, end, marker) else "switch"
+                run = inside[begin:end]
+                found.append(Run(k, int(frame[run[0]]), int(frame[run[-1]]), kind, run))
         for begin, end in _runs(~named[own]):
             run = own[begin:end]
             found.append(Run(k, int(frame[run[0]]), int(frame[run[-1]]), "clutter", run))
     return found
+
+
+def _of_one_label(labels: Indices, begin: int, end: int) -> list[tuple[int, int]]:
+    cuts = begin + 1 + np.flatnonzero(np.diff(labels[begin:end]))
+    return list(itertools.pairwise([begin, *cuts.tolist(), end]))
 
 
 def _runs(values: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
@@ -136,6 +146,8 @@ class Labels:
                 continue
             inside, outside = own[at], own[at - way]
             if abs(self.frame[inside] - self.frame[outside]) > NEXT:
+                continue
+            if self.labels[outside] != marker:
                 continue
             label = self.labels[inside]
             n = abs(int(self.frame[inside]) - int(self.frame[outside]))

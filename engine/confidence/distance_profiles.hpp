@@ -8,6 +8,10 @@
 //   d    distance of the part to another track, the median of a few frames
 //   m, s median and spread of that distance in a profile
 //   log density: Student's t of (d - m) / s, in the mean over the steadiest distances
+//
+// Posture changes some distances by many spreads for seconds, as those of a shoulder to a hand. An
+// unknown marker is therefore compared a second time by the range of most deviations, with weights
+// by how much a range differs from that of an unknown marker.
 #pragma once
 
 #include <algorithm>
@@ -47,16 +51,13 @@ class DistanceProfiles {
         steady_.push_back({std::hypot(of_a.spread, of_b.spread), r});
     }
     if (steady_.size() < kMinAgreeing) return -std::numeric_limits<double>::infinity();
-    const std::size_t n = std::min(steady_.size(), kNeighbours);
-    std::partial_sort(steady_.begin(), steady_.begin() + static_cast<std::ptrdiff_t>(n),
-                      steady_.end());
+    keep_steadiest(steady_);
     double sum = 0;
-    for (std::size_t i = 0; i < n; ++i) {
-      const auto& [spread, r] = steady_[i];
+    for (const auto& [spread, r] : steady_) {
       const double off = distance(a, r).median - distance(b, r).median;
       sum += log_t(off, spread) - log_t(off, std::hypot(spread, kUnknownSpread));
     }
-    return sum / static_cast<double>(n);
+    return sum / static_cast<double>(steady_.size());
   }
 
   PartEvidence compare(const TrackPart& part) {
@@ -64,6 +65,7 @@ class DistanceProfiles {
     if (!choose_steady(part)) return found;
     found.is_known = true;
     found.unknown = unknown(part.track);
+    found.in_range = unknown_in_range(part.track);
     for (std::int32_t k = 0; k < static_cast<std::int32_t>(all_.n_tracks); ++k) {
       if (k == part.track) continue;
       const bool is_partner = std::ranges::find(part.partners, k) != part.partners.end();
@@ -141,7 +143,9 @@ class DistanceProfiles {
   static constexpr double kMaxPresent = 0.2;  // share of a part in which an alternative is present
 
   struct Distance {
-    double median = kNone, spread = 0;
+    double median = kNone;
+    double spread = 0;  // from the median deviation
+    double range = 0;   // from the deviation that `kMost` of all do not exceed
     bool is_known() const { return median >= 0; }
   };
   // Medians of a distance that is not known, of one that has not been computed, and of one of which
@@ -158,11 +162,17 @@ class DistanceProfiles {
       if (const Distance* own = steady(part.track, r)) steady_.push_back({own->spread, r});
     }
     if (steady_.size() < kMinNeighbours) return false;
-    const std::size_t n = std::min(steady_.size(), kNeighbours);
-    std::partial_sort(steady_.begin(), steady_.begin() + static_cast<std::ptrdiff_t>(n),
-                      steady_.end());
-    steady_.resize(n);
+    ranges_.clear();
+    for (const auto& [spread, r] : steady_) ranges_.push_back({distance(part.track, r).range, r});
+    keep_steadiest(steady_);
+    keep_steadiest(ranges_);
     return true;
+  }
+  using BySpread = std::vector<std::pair<double, std::size_t>>;
+  static void keep_steadiest(BySpread& all) {
+    const std::size_t n = std::min(all.size(), kNeighbours);
+    std::partial_sort(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(n), all.end());
+    all.resize(n);
   }
   // Log density of the chosen distances for an unknown marker, relative to the own track.
   double unknown(std::int32_t own) {
@@ -173,6 +183,18 @@ class DistanceProfiles {
       of_unknown += log_t(off, std::hypot(spread, kUnknownSpread));
     }
     return (of_unknown - of_own) / static_cast<double>(steady_.size());
+  }
+  // The same by the ranges of the distances.
+  double unknown_in_range(std::int32_t own) {
+    double sum = 0, weights = 0;
+    for (const auto& [range, r] : ranges_) {
+      const double off = distances_[r] - distance(own, r).median;
+      const double of_unknown = std::hypot(range, kUnknownSpread);
+      const double weight = std::log(of_unknown / range);
+      sum += weight * (log_t(off, of_unknown) - log_t(off, range));
+      weights += weight;
+    }
+    return sum / weights;
   }
   // Log density of the chosen distances by the profile of another track, relative to the own; -inf
   // without enough of them.
@@ -331,6 +353,13 @@ class DistanceProfiles {
     for (double& value : values) value = std::abs(std::sqrt(value) - found.median);
     const double spread = kOfNormal * median_of(values);
     found.spread = std::sqrt(spread * spread + least);
+    // The values beyond the median are behind it.
+    const auto most = values.begin() + static_cast<std::ptrdiff_t>(
+                                           kMost * static_cast<double>(values.size() - 1));
+    std::nth_element(values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), most,
+                     values.end());
+    const double range = kOfMost * *most;
+    found.range = std::sqrt(range * range + least);
     return found;
   }
   // Whether too few of the squared distances are near their median for a steady distance. `least` is
@@ -373,6 +402,7 @@ class DistanceProfiles {
   }
 
   static constexpr double kOfNormal = 1.4826;  // standard deviation per median deviation
+  static constexpr double kMost = 0.8, kOfMost = 0.7803;  // and per deviation of that rank
 
   LabelledFrames all_;
   double floor2_;
@@ -387,7 +417,7 @@ class DistanceProfiles {
   std::size_t n_measured_ = 0;
   std::vector<double> values_, distances_, n_present_;
   std::vector<std::ptrdiff_t> counts_;
-  std::vector<std::pair<double, std::size_t>> steady_;
+  BySpread steady_, ranges_;
 };
 
 }  // namespace asterism

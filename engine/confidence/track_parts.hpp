@@ -34,6 +34,7 @@ struct PartEvidence {
   std::array<std::int32_t, kMost> track{-1, -1, -1};
   std::array<double, kMost> density{-kInfinite, -kInfinite, -kInfinite};
   double unknown = 0;     // density of an unknown marker
+  double in_range = 0;    // the same by the ranges of most deviations from the profile
   bool is_known = false;  // whether the part has enough steady distances
 
  private:

@@ -122,8 +122,8 @@ class Profiles {
   }
 
   // For parts of tracks, each in some frames: (whether their distances are known, log density of an
-  // unknown marker relative to the own track, other tracks by falling density (P, 3), their
-  // densities (P, 3)).
+  // unknown marker relative to the own track, the same by ranges, other tracks by falling density
+  // (P, 3), their densities (P, 3)).
   nb::tuple compare(const In<std::int64_t>& tracks, const In<std::int64_t>& frames,
                     const In<std::int64_t>& offsets, const In<std::int64_t>& partners,
                     std::int32_t n_threads) {
@@ -156,6 +156,7 @@ class Profiles {
     }
     return nb::make_tuple(array_of<bool>(found, &PartEvidence::is_known),
                           array_of<double>(found, &PartEvidence::unknown),
+                          array_of<double>(found, &PartEvidence::in_range),
                           others.give({n_parts, n_most}), densities.give({n_parts, n_most}));
   }
 

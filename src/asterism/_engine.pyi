@@ -537,10 +537,11 @@ class DistanceProfiles:
         change: float,
         max_gap: int,
     ) -> Ints: ...
-    # (whether distances are known, log densities of an unknown marker, other tracks, theirs)
+    # (whether distances are known, log densities of an unknown marker, the same by ranges, other
+    # tracks, theirs)
     def compare(
         self, tracks: Ints, frames: Ints, offsets: Ints, partners: Ints, *, n_threads: int
-    ) -> tuple[NDArray[np.bool_], Floats, Ints, Floats]: ...
+    ) -> tuple[NDArray[np.bool_], Floats, Floats, Ints, Floats]: ...
     # Log densities of other tracks and of an unknown marker, relative to the own track.
     def densities(self, tracks: Ints, frames: Ints, offsets: Ints, others: Ints) -> Floats: ...
 

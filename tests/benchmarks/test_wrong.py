@@ -42,15 +42,33 @@ def test_exchanged_tracks_are_switches_and_exchanged_labels_are_errors(corrupted
         assert max(run.last for run in runs) == LAST
 
 
-def test_a_label_that_changes_in_a_gap_is_an_error_by_its_distances():
-    made = am.simulate.person(frames=300, n_markers=40, seed=2)
+def with_gaps(made: am.Tracks) -> am.Tracks:
+    """Occlude the two markers around the first and the last frame of the exchange."""
     positions = made.positions()
     for at in (FIRST, LAST):
         positions[at - 6 : at + 7, PAIR] = np.nan
-    truth = am.Tracks.from_dense(made.detections.times, positions)
+    return am.Tracks.from_dense(made.detections.times, positions)
+
+
+def test_a_label_that_changes_in_a_gap_is_an_error_by_its_distances():
+    truth = with_gaps(am.simulate.person(frames=300, n_markers=40, seed=2))
     wrong = exchanged(truth)
     assert {run.kind for run in wrong_runs(wrong, truth)} == {"switch"}
     assert {run.kind for run in wrong_runs(truth, wrong)} == {"label error"}
+
+
+def test_a_switch_within_labels_that_are_wrong_is_judged_on_its_own():
+    truth = with_gaps(am.simulate.person(frames=300, n_markers=40, seed=2))
+    frame, labels = truth.detections.frame_of, truth.labels.copy()
+    one, third = PAIR[0], 20
+    inside = (frame >= 115) & (frame < 120)
+    labels[inside & (truth.labels == one)] = -1
+    labels[inside & (truth.labels == third)] = one
+    runs = wrong_runs(replace(truth, labels=labels), exchanged(truth))
+    found = [(run.kind, run.first, run.last) for run in runs if run.track == one]
+    assert found == [
+        ("label error", 107, 114), ("switch", 115, 119), ("label error", 120, 132)
+    ]  # fmt: skip
 
 
 def test_two_markers_in_one_place_are_no_switch():

@@ -79,11 +79,14 @@ def compared(positions, noise, parts, threads=1):
 
 def held_to_reference(positions, parts, noise=0.002):
     """Return the number of known parts and of alternatives, as of the reference implementation."""
-    is_known, unknown, others, densities = compared(positions, noise, parts)
+    is_known, unknown, in_range, others, densities = compared(positions, noise, parts)
     for p, (track, frames, partners) in enumerate(parts):
-        known, log_unknown, best = compare_part(positions, noise, track, frames, set(partners))
+        known, log_unknown, log_in_range, best = compare_part(
+            positions, noise, track, frames, set(partners)
+        )
         assert is_known[p] == known
         assert unknown[p] == pytest.approx(log_unknown, abs=TOLERANCE, rel=TOLERANCE)
+        assert in_range[p] == pytest.approx(log_in_range, abs=TOLERANCE, rel=TOLERANCE)
         assert others[p].tolist() == [k for _, k in best] + [-1] * (3 - len(best))
         wanted = [density for density, _ in best] + [-np.inf] * (3 - len(best))
         assert densities[p].tolist() == pytest.approx(wanted, abs=TOLERANCE, rel=TOLERANCE)
@@ -128,8 +131,8 @@ def test_only_the_longest_tracks_are_references():
 
 
 def test_no_part_is_compared_with_nothing():
-    assert [len(each) for each in compared(np.empty((0, 0, 3)), 0.001, [])] == [0, 0, 0, 0]
-    assert [len(each) for each in compared(np.zeros((3, 1, 3)), 0.001, [])] == [0, 0, 0, 0]
+    assert [len(each) for each in compared(np.empty((0, 0, 3)), 0.001, [])] == [0, 0, 0, 0, 0]
+    assert [len(each) for each in compared(np.zeros((3, 1, 3)), 0.001, [])] == [0, 0, 0, 0, 0]
 
 
 MADE = {

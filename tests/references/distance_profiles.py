@@ -8,6 +8,7 @@ SAMPLES, REFERENCES, PART_FRAMES, NEIGHBOURS = 160, 128, 8, 6
 MIN_FRAMES, MIN_NEIGHBOURS, ALTERNATIVES = 6, 2, 3
 MIN_NOISE, BEND, STEADY, UNKNOWN_SPREAD = 1e-3, 0.02, 0.1, 0.1
 SAME, MAX_PRESENT = -0.5, 0.2
+MOST, OF_MOST = 0.8, 0.7803
 
 
 def compare_part(positions, noise, track, frames, partners):
@@ -15,8 +16,8 @@ def compare_part(positions, noise, track, frames, partners):
 
     The positions have shape (T, K, D), NaN where a track has no detection.
 
-    Returns whether the distances are known, the log density of an unknown marker, and up to three
-    (log density, track), all relative to the own track.
+    Returns whether the distances are known, the log density of an unknown marker, the same by
+    ranges, and up to three (log density, track), all relative to the own track.
     """
     n_tracks = positions.shape[1]
     is_present = np.isfinite(positions[:, :, 0])
@@ -38,13 +39,19 @@ def compare_part(positions, noise, track, frames, partners):
     steady = sorted((own[r][1], order[r], r) for r in distances if own[r][1] < STEADY)
     steady = [r for _, _, r in steady[:NEIGHBOURS]]
     if len(steady) < MIN_NEIGHBOURS:
-        return False, 0.0, []
-    off = {r: distances[r] - own[r][0] for r in steady}
+        return False, 0.0, 0.0, []
+    off = {r: distances[r] - own[r][0] for r in distances}
     unknown = np.mean(
         [
             _log_t(off[r], np.hypot(own[r][1], UNKNOWN_SPREAD)) - _log_t(off[r], own[r][1])
             for r in steady
         ]
+    )
+    ranges = sorted((own[r][2], order[r], r) for r in distances if own[r][1] < STEADY)
+    of_own, apart = np.array([(s, off[r]) for s, _, r in ranges[:NEIGHBOURS]]).T
+    of_unknown = np.hypot(of_own, UNKNOWN_SPREAD)
+    in_range = np.average(
+        _log_t(apart, of_unknown) - _log_t(apart, of_own), weights=np.log(of_unknown / of_own)
     )
     others = []
     for k in range(n_tracks):
@@ -69,7 +76,8 @@ def compare_part(positions, noise, track, frames, partners):
             ]
         )
         others.append((float(density), k))
-    return True, float(unknown), sorted(others, key=lambda one: (-one[0], one[1]))[:ALTERNATIVES]
+    best = sorted(others, key=lambda one: (-one[0], one[1]))[:ALTERNATIVES]
+    return True, float(unknown), float(in_range), best
 
 
 def references_of(positions):
@@ -85,7 +93,7 @@ def samples_of(positions):
 
 
 def profile_of(positions, noise, k):
-    """Return the median and spread of the distance of a track to each reference that has one."""
+    """Return median, spread and range of the distance of a track to each reference that has one."""
     found, is_present = {}, np.isfinite(positions[:, :, 0])
     for r in references_of(positions):
         both = [t for t in samples_of(positions) if is_present[t, k] and is_present[t, r]]
@@ -93,9 +101,10 @@ def profile_of(positions, noise, k):
             continue
         values = np.linalg.norm(positions[both, k] - positions[both, r], axis=1)
         median = _upper_median(values)
-        spread = 1.4826 * _upper_median(abs(values - median))
+        off = np.sort(abs(values - median))
+        spread, most = 1.4826 * _upper_median(off), OF_MOST * off[int(MOST * (len(off) - 1))]
         floor = 2 * max(noise, MIN_NOISE) ** 2 + (BEND * median) ** 2
-        found[r] = median, np.sqrt(spread**2 + floor)
+        found[r] = median, np.sqrt(spread**2 + floor), np.sqrt(most**2 + floor)
     return found
 
 
@@ -104,7 +113,7 @@ def log_ratio_to_unknown(distances, profile):
 
     It is the mean over the steadiest ones, None where there are too few.
     """
-    steady = sorted((s, i, r) for i, (r, (_, s)) in enumerate(profile.items()) if s < STEADY)
+    steady = sorted((s, i, r) for i, (r, (_, s, _)) in enumerate(profile.items()) if s < STEADY)
     used = [r for _, _, r in steady if r in distances][:NEIGHBOURS]
     if len(used) < MIN_NEIGHBOURS:
         return None

@@ -18,10 +18,13 @@ if TYPE_CHECKING:
 
 __all__ = ["Place", "places_of"]
 
-UNCERTAIN = 0.8
-"""Probability of an identity or a name from which no look is needed."""
+UNCERTAIN, UNCERTAIN_NAME = 0.9, 0.8
+"""Probabilities of an identity or a join, and of a name, from which they are not listed."""
 MIN_EXPECTED = 1.0
-"""Smallest expected number of wrong detections of a place. Fewer are added to the nearest place."""
+"""Smallest expected number of wrong detections of a place."""
+WRONG = 0.5
+"""Probability below which an identity or a join of a place must be: one that is more probably wrong
+than right. Other uncertain parts are added to the nearest place."""
 NEAR_SECONDS = 0.5
 """Time within which uncertain parts of a track, or of two that may be exchanged, are one place, and
 within which less uncertain ones are added to a place."""
@@ -92,10 +95,11 @@ def places_of(tracks: Tracks) -> tuple[Place, ...]:
     Returns
     -------
     tuple of Place
-        Identities and names of a probability below `UNCERTAIN`. One place are parts of one track
-        that follow each other, parts of two tracks that may be exchanged, and long parts of several
-        tracks at one time, as of a subject that walks out and in again. Joins, and parts with less
-        than one expected wrong detection, are in the nearest place within half a second.
+        Identities and joins of a probability below 0.9, and names below 0.8. One place are parts of
+        one track that follow each other, parts of two tracks that may be exchanged, and long parts
+        of several tracks at one time, as of a subject that walks out and in again. A place has a
+        name, or a part or join that is more probably wrong than right, and at least one expected
+        wrong detection. Other uncertain parts are in the nearest place within half a second.
 
     Examples
     --------
@@ -109,7 +113,9 @@ def places_of(tracks: Tracks) -> tuple[Place, ...]:
     uncertain = [
         each
         for each in decisions
-        if each.probability is not None and each.probability < UNCERTAIN and each.track >= 0
+        if each.probability is not None
+        and each.probability < (UNCERTAIN_NAME if each.kind == "name" else UNCERTAIN)
+        and each.track >= 0
     ]
     times = tracks.detections.times
     groups: list[list[Decision]] = []
@@ -129,23 +135,30 @@ def places_of(tracks: Tracks) -> tuple[Place, ...]:
         else:
             groups.append([each])
             near.append(groups[-1])
-    places = _without_small([Place(decisions=tuple(own)) for own in groups], times)
+    places = _with_rest([Place(decisions=tuple(own)) for own in groups], times)
     return tuple(sorted(places, key=lambda each: (-each.expected_wrong, each.first)))
 
 
-def _without_small(places: list[Place], times: NDArray[np.float64]) -> Iterator[Place]:
-    """Add the places with few expected wrong detections to the others, if these are near."""
-    large = [each for each in places if each.expected_wrong >= MIN_EXPECTED]
-    decisions = [list(each.decisions) for each in large]
-    begins, ends = (times[[getattr(each, at) for each in large]] for at in ("first", "last"))
-    for each in places if large else ():
+def _with_rest(places: list[Place], times: NDArray[np.float64]) -> Iterator[Place]:
+    """Add the places that need no look of their own to the nearest others, if these are near."""
+    own = [each for each in places if _needs_look(each)]
+    decisions = [list(each.decisions) for each in own]
+    begins, ends = (times[[getattr(each, at) for each in own]] for at in ("first", "last"))
+    for each in places if own else ():
         away = np.maximum(times[each.first] - ends, begins - times[each.last])
         nearest = int(np.argmin(away))
-        if each.expected_wrong < MIN_EXPECTED and away[nearest] <= NEAR_SECONDS:
+        if not _needs_look(each) and away[nearest] <= NEAR_SECONDS:
             decisions[nearest] += each.decisions
-    for own in decisions:
-        own.sort(key=lambda each: (-each.expected_wrong, each.track))
-        yield Place(decisions=tuple(own))
+    for all_of in decisions:
+        all_of.sort(key=lambda each: (-each.expected_wrong, each.track))
+        yield Place(decisions=tuple(all_of))
+
+
+def _needs_look(place: Place) -> bool:
+    return place.expected_wrong >= MIN_EXPECTED and any(
+        each.kind == "name" or (each.probability is not None and each.probability < WRONG)
+        for each in place.decisions
+    )
 
 
 def _of_confidence(tracks: Tracks) -> Iterator[Decision]:

@@ -13,8 +13,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asterism.records import record
-from asterism.tracking.confidence import assess
-from asterism.tracking.confidence.identity import OTHER_JOIN
+from asterism.tracking.confidence.identity import (
+    OTHER_JOIN,
+    Examined,
+    examine,
+    expected_right,
+    with_confidence,
+)
 from asterism.tracking.confidence.reassign import ghost_log_odds, reassigned
 from asterism.tracking.estimation import OVER_THREE_FRAMES, fit_body_motion, fit_to_tracks
 from asterism.tracking.lone import with_lone_detections
@@ -79,17 +84,20 @@ class Uncorrected:
     naming: Naming | None = None
 
     @cached_property
+    def examined(self) -> Examined:
+        """What the confidence of identities is computed from."""
+        threads = self.recipe.options.get("threads", 1)
+        return examine(self.tracks, self.model, self.stitching, threads=threads)
+
+    @cached_property
     def assessed(self) -> Tracks:
         """The tracks with the confidence of their identities."""
-        threads = self.recipe.options.get("threads", 1)
-        return assess(self.tracks, self.model, self.stitching, threads=threads)
+        return with_confidence(self.tracks, self.examined)
 
-    @property
+    @cached_property
     def expected_right(self) -> float:
         """Number of detections whose identity is expected to be right."""
-        confidence = self.assessed.identity_confidence
-        assert confidence is not None
-        return float(confidence.sum())
+        return expected_right(self.tracks, self.examined)
 
     @property
     def is_doubtful(self) -> bool:

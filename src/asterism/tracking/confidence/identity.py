@@ -10,6 +10,7 @@ import numpy as np
 from asterism.model.decision import Alternative, Decision
 from asterism.records import record
 from asterism.tracking.confidence.calibration import (
+    IDENTITY,
     PART,
     WHOLE,
     part_features,
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from asterism.model import TrackingModel, Tracks
     from asterism.tracking.stitching import Stitching
 
-__all__ = ["Examined", "assess", "examine"]
+__all__ = ["Examined", "assess", "examine", "expected_right", "with_confidence"]
 
 CERTAIN = 0.98
 """Probability of a link from which a track is not cut into parts there."""
@@ -86,9 +87,39 @@ def assess(
     >>> float(tracks.identity_confidence.min()) > 0.99, tracks.decisions
     (True, ())
     """
-    found = examine(tracks, model, stitching, threads=threads)
+    return with_confidence(tracks, examine(tracks, model, stitching, threads=threads))
+
+
+def expected_right(tracks: Tracks, found: Examined) -> float:
+    """Return the number of detections whose identity is expected to be right, to compare results.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks of a capture.
+    found : Examined
+        Result of `examine` for them.
+    """
+    parts = found.parts
+    features = part_features(found.evidence, parts.weakest, parts.n_detections, in_range=False)
+    known = part_probability(features, PART)
+    return float(parts.n_detections @ _probability(found, known, tracks.n_tracks))
+
+
+def with_confidence(tracks: Tracks, found: Examined) -> Tracks:
+    """Return tracks with the confidences and decisions of `assess`.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks of a capture.
+    found : Examined
+        Result of `examine` for them.
+    """
     parts, order = found.parts, tracks.by_track[0]
-    probability = _probability(parts, found.evidence, tracks.n_tracks)
+    features = part_features(found.evidence, parts.weakest, parts.n_detections, in_range=True)
+    known = part_probability(features, IDENTITY)
+    probability = _probability(found, known, tracks.n_tracks)
     identity = np.where(tracks.labels >= 0, WHOLE, 0.0)
     for p in np.flatnonzero(probability < WHOLE):
         identity[order[parts.offsets[p] : parts.offsets[p + 1]]] = probability[p]
@@ -236,21 +267,29 @@ def _joins(tracks: Tracks, stitching: Stitching) -> tuple[NDArray[np.int64], NDA
     return then, p
 
 
-def _probability(parts: Parts, evidence: Evidence, n_tracks: int) -> NDArray[np.float64]:
-    """Return the probability that each part is on the marker of its track."""
-    known = part_probability(part_features(evidence, parts.weakest, parts.n_detections))
-    probability = np.where(evidence.is_known, known, _chained(parts, n_tracks))
+def _probability(found: Examined, known: NDArray[np.float64], n_tracks: int) -> NDArray[np.float64]:
+    """Return the probability that each part is on the marker of its track.
+
+    Those with enough distances have the one that is `known` by them.
+    """
+    parts = found.parts
+    probability = np.where(found.evidence.is_known, known, _chained(parts, n_tracks))
     whole = track_probability(parts.n_detections)
     return np.minimum(np.where(parts.is_whole(n_tracks), whole, probability), WHOLE)
 
 
 def _chained(parts: Parts, n_tracks: int) -> NDArray[np.float64]:
-    """Return the product of the links between each part and the longest part of its track."""
+    """Return the probability that each part is on the marker of the longest part of its track.
+
+    It is the product of the links between both, and of the probability that the longest one is of
+    one marker.
+    """
     logs = np.cumsum(np.log(np.maximum(parts.before, 1e-12)))
     longest = np.zeros(n_tracks, dtype=np.int64)
     order = np.argsort(parts.n_detections, kind="stable")
     longest[parts.track[order]] = order  # the last assignment is of the longest part
-    return np.exp(-np.abs(logs - logs[longest[parts.track]]))
+    other = longest[parts.track]
+    return np.exp(-np.abs(logs - logs[other])) * track_probability(parts.n_detections[other])
 
 
 def _decisions(tracks: Tracks, found: Examined, probability: NDArray[np.float64]) -> list[Decision]:
@@ -280,7 +319,9 @@ def _alternatives(
     """Return the alternatives of a part, which share the complement of its probability."""
     if evidence.is_known[p]:
         others = np.append(evidence.alternatives[p], -1)
-        log_weights = np.append(PART[2] * evidence.densities[p], PART[1] * evidence.unknown[p])
+        log_weights = np.append(
+            IDENTITY[2] * evidence.densities[p], IDENTITY[1] * evidence.in_range[p]
+        )
         weights = np.exp(log_weights - log_weights.max())
     else:
         others = np.unique(partners[partners >= 0])

@@ -68,6 +68,9 @@ class Evidence:
         Whether a part has enough steady distances; False for whole tracks, which are not compared.
     unknown : ndarray of shape (P,)
         Log density of an unknown marker relative to the own track.
+    in_range : ndarray of shape (P,)
+        The same by the range of most deviations from the distances of the own track, which posture
+        changes less.
     alternatives : ndarray of int, shape (P, 3)
         Other tracks whose distances fit best, -1 for none.
     densities : ndarray of shape (P, 3)
@@ -76,6 +79,7 @@ class Evidence:
 
     is_known: NDArray[np.bool_]
     unknown: NDArray[np.float64]
+    in_range: NDArray[np.float64]
     alternatives: NDArray[np.int64]
     densities: NDArray[np.float64]
 
@@ -142,7 +146,7 @@ def compare(
     order, _ = tracks.by_track
     n = len(parts.track)
     evidence = Evidence(
-        np.zeros(n, bool), np.zeros(n), np.full((n, 3), -1), np.full((n, 3), -np.inf)
+        np.zeros(n, bool), np.zeros(n), np.zeros(n), np.full((n, 3), -1), np.full((n, 3), -np.inf)
     )
     used = np.flatnonzero(~parts.is_whole(tracks.n_tracks))
     if len(used):
@@ -161,7 +165,10 @@ def compare(
             np.ascontiguousarray(partners[used]),
             n_threads=threads,
         )
-        arrays = evidence.is_known, evidence.unknown, evidence.alternatives, evidence.densities
+        arrays = (
+            evidence.is_known, evidence.unknown, evidence.in_range, evidence.alternatives,
+            evidence.densities,
+        )  # fmt: skip
         for values, own in zip(arrays, found, strict=True):
             values[used] = own
     return evidence
