@@ -151,11 +151,12 @@ def instances():
         ),
         am.model.Edit(kind="name", at=((3, 5),), name=LONG, who=LONG),
         am.tracking.Stretch(
-            first=5, last=17, source=3, target=-1, n_detections=9, is_asked=True
+            first=5, last=17, source=3, target=-1, n_detections=9, is_asked=True, group=0
         ),
         am.tracking.Change(
             edit=am.model.Edit(kind="name", at=((3, 5),), name=LONG), detections=np.arange(9),
-            before=np.zeros(9), after=np.ones(9), stretches=(), names={},
+            before=np.zeros(9), after=np.ones(9), stretch_of=np.zeros(9, dtype=int), stretches=(),
+            names={},
         ),
         am.tracking.Correction(truth, plain),
         am.edit.Session(without_edits(am.track(d).recipe, d), Path(LONG)),
