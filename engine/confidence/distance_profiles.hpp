@@ -26,6 +26,7 @@
 #include <utility>
 #include <vector>
 
+#include "confidence/learnt_distance.hpp"
 #include "confidence/track_parts.hpp"
 #include "math/point.hpp"
 
@@ -46,7 +47,7 @@ class DistanceProfiles {
     steady_.clear();
     for (std::size_t r = 0; r < references_.size(); ++r) {
       if (references_[r] == a || references_[r] == b) continue;
-      const Distance &of_a = distance(a, r), &of_b = distance(b, r);
+      const LearntDistance &of_a = distance(a, r), &of_b = distance(b, r);
       if (of_a.is_known() && of_b.is_known())
         steady_.push_back({std::hypot(of_a.spread, of_b.spread), r});
     }
@@ -135,22 +136,10 @@ class DistanceProfiles {
  private:
   static constexpr std::size_t kReferences = 128;  // longest tracks, to which distances are taken
   static constexpr std::size_t kNeighbours = 6, kMinNeighbours = 2, kMinAgreeing = 3;
-  static constexpr std::size_t kMinFrames = 6;  // of a distance in a profile
   static constexpr double kMinNoise = 1e-3;     // metres
-  static constexpr double kBend = 0.02;         // spread of a distance as a share of it
-  static constexpr double kSteady = 0.1, kUnknownSpread = 0.1;  // metres
+  static constexpr double kUnknownSpread = 0.1;  // metres
   static constexpr double kSame = -0.5;  // log density of the difference of equal profiles
   static constexpr double kMaxPresent = 0.2;  // share of a part in which an alternative is present
-
-  struct Distance {
-    double median = kNone;
-    double spread = 0;  // from the median deviation
-    double range = 0;   // from the deviation that `kMost` of all do not exceed
-    bool is_known() const { return median >= 0; }
-  };
-  // Medians of a distance that is not known, of one that has not been computed, and of one of which
-  // only is known that it is not steady.
-  static constexpr double kNone = -1, kLater = -2, kLoose = -3;
 
   // Measures the distances of a part, and chooses the steadiest ones of its own track. Returns
   // whether there are enough.
@@ -159,7 +148,7 @@ class DistanceProfiles {
     steady_.clear();
     for (std::size_t r = 0; r < references_.size(); ++r) {
       if (distances_[r] < 0) continue;
-      if (const Distance* own = steady(part.track, r)) steady_.push_back({own->spread, r});
+      if (const LearntDistance* own = steady(part.track, r)) steady_.push_back({own->spread, r});
     }
     if (steady_.size() < kMinNeighbours) return false;
     ranges_.clear();
@@ -202,7 +191,7 @@ class DistanceProfiles {
     double sum = 0;
     std::size_t n_common = 0;
     for (const auto& [spread, r] : steady_) {
-      const Distance& of_other = distance(other, r);
+      const LearntDistance& of_other = distance(other, r);
       if (!of_other.is_known()) continue;
       ++n_common;
       sum += log_t(distances_[r] - of_other.median, of_other.spread) -
@@ -222,7 +211,7 @@ class DistanceProfiles {
     double sum = 0;
     std::size_t n = 0;
     for (const auto& [spread, r] : steady_) {
-      const Distance &a = distance(own, r), &b = distance(other, r);
+      const LearntDistance &a = distance(own, r), &b = distance(other, r);
       if (!b.is_known()) continue;
       const double both = std::hypot(a.spread, b.spread);
       sum += log_t(a.median - b.median, both) - log_t(0, both);
@@ -245,12 +234,6 @@ class DistanceProfiles {
         std::swap(track, found.track[i]);
       }
   }
-  static double median_of(std::vector<double>& values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::ranges::nth_element(values, middle);
-    return *middle;
-  }
-
   void choose_references() {
     std::vector<std::int64_t> length(all_.n_tracks, 0);
     for (const std::int64_t k : all_.labels)
@@ -301,17 +284,18 @@ class DistanceProfiles {
   }
 
   // The distance of a track to a reference, which is computed when it is first needed.
-  const Distance& distance(std::int32_t track, std::size_t r) {
-    Distance& own = kept(track, r);
-    if (own.median == kLater || own.median == kLoose) own = learn(track, r, false);
+  const LearntDistance& distance(std::int32_t track, std::size_t r) {
+    LearntDistance& own = kept(track, r);
+    if (own.median == LearntDistance::kLater || own.median == LearntDistance::kLoose)
+      own = learn(track, r, false);
     return own;
   }
   // The same if it is steady, null otherwise. Most distances between segments are not, which takes
   // less time to find out than their spread.
-  const Distance* steady(std::int32_t track, std::size_t r) {
-    Distance& own = kept(track, r);
-    if (own.median == kLater) own = learn(track, r, true);
-    return own.is_known() && own.spread < kSteady ? &own : nullptr;
+  const LearntDistance* steady(std::int32_t track, std::size_t r) {
+    LearntDistance& own = kept(track, r);
+    if (own.median == LearntDistance::kLater) own = learn(track, r, true);
+    return own.is_known() && own.spread < LearntDistance::kSteady ? &own : nullptr;
   }
   // A steady distance, with what its density relative to an unknown marker needs.
   struct Steady {
@@ -324,7 +308,7 @@ class DistanceProfiles {
     if (steadiest_[track]) return *steadiest_[track];
     std::vector<Steady>& found = steadiest_[track].emplace();
     for (std::size_t r = 0; r < references_.size(); ++r)
-      if (const Distance* own = steady(static_cast<std::int32_t>(track), r)) {
+      if (const LearntDistance* own = steady(static_cast<std::int32_t>(track), r)) {
         const double s2 = own->spread * own->spread, u2 = s2 + kUnknownSpread * kUnknownSpread;
         found.push_back({references_[r], own->median, own->spread, 1 / (3 * s2), 1 / (3 * u2),
                          std::log(u2 / s2) / 2});
@@ -332,47 +316,19 @@ class DistanceProfiles {
     std::ranges::stable_sort(found, {}, &Steady::spread);
     return found;
   }
-  Distance& kept(std::int32_t track, std::size_t r) {
-    std::vector<Distance>& profile = profiles_[track];
-    if (profile.empty()) profile.assign(references_.size(), {kLater});
+  LearntDistance& kept(std::int32_t track, std::size_t r) {
+    std::vector<LearntDistance>& profile = profiles_[track];
+    if (profile.empty()) profile.assign(references_.size(), {LearntDistance::kLater});
     return profile[r];
   }
-  Distance learn(std::int32_t track, std::size_t r, bool only_steady) {
+  LearntDistance learn(std::int32_t track, std::size_t r, bool only_steady) {
     if (references_[r] == track) return {};
-    std::vector<double>& values = of_samples_;
-    values.clear();
+    of_samples_.clear();
     const std::int32_t* of_reference = at_.data() + r * all_.samples.size();
     for (const auto& [s, point] : samples_of(track))
       if (const std::int32_t other = of_reference[s]; other >= 0)
-        values.push_back(squared_distance(all_.points[point], all_.points[other], all_.D));
-    if (values.size() < kMinFrames) return {};
-    // The root of the median is the median of the roots, which most of the time are not needed.
-    Distance found{std::sqrt(median_of(values))};
-    const double bend = kBend * found.median, least = floor2_ + bend * bend;
-    if (only_steady && is_surely_loose(values, found.median, least)) return {kLoose};
-    for (double& value : values) value = std::abs(std::sqrt(value) - found.median);
-    const double spread = kOfNormal * median_of(values);
-    found.spread = std::sqrt(spread * spread + least);
-    // The values beyond the median are behind it.
-    const auto most = values.begin() + static_cast<std::ptrdiff_t>(
-                                           kMost * static_cast<double>(values.size() - 1));
-    std::nth_element(values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), most,
-                     values.end());
-    const double range = kOfMost * *most;
-    found.range = std::sqrt(range * range + least);
-    return found;
-  }
-  // Whether too few of the squared distances are near their median for a steady distance. `least` is
-  // the part of the squared spread that does not depend on them.
-  static bool is_surely_loose(std::span<const double> squares, double median, double least) {
-    constexpr double kBeyondRounding = 1 + 1e-9;
-    const double left = kSteady * kSteady - least;
-    if (left <= 0) return true;
-    const double far = kBeyondRounding * std::sqrt(left) / kOfNormal;
-    const double low = std::max(median - far, 0.0), high = median + far;
-    std::size_t n_near = 0;
-    for (const double square : squares) n_near += square >= low * low && square <= high * high;
-    return n_near <= squares.size() / 2;
+        of_samples_.push_back(squared_distance(all_.points[point], all_.points[other], all_.D));
+    return learn_distance(of_samples_, floor2_, only_steady);
   }
   // The median distances of a part to the references, -1 where there is none.
   void measure(const TrackPart& part) {
@@ -401,16 +357,13 @@ class DistanceProfiles {
     }
   }
 
-  static constexpr double kOfNormal = 1.4826;  // standard deviation per median deviation
-  static constexpr double kMost = 0.8, kOfMost = 0.7803;  // and per deviation of that rank
-
   LabelledFrames all_;
   double floor2_;
   std::vector<std::int32_t> references_, reference_of_;
   std::vector<Sample> samples_;  // one track after the other
   std::vector<std::size_t> begin_;  // of each track in `samples_`
   std::vector<std::int32_t> at_;  // point of each reference in the sampled frames, -1 for none
-  std::vector<std::vector<Distance>> profiles_;  // of each track, empty until it is needed
+  std::vector<std::vector<LearntDistance>> profiles_;  // of each track, empty until it is needed
   std::vector<std::optional<std::vector<Steady>>> steadiest_;
   std::vector<double> of_samples_;
   // Of the part that is compared.

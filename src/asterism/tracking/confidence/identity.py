@@ -100,10 +100,7 @@ def expected_right(tracks: Tracks, found: Examined) -> float:
     found : Examined
         Result of `examine` for them.
     """
-    parts = found.parts
-    features = part_features(found.evidence, parts.weakest, parts.n_detections, in_range=False)
-    known = part_probability(features, PART)
-    return float(parts.n_detections @ _probability(found, known, tracks.n_tracks))
+    return float(found.parts.n_detections @ _probability(found, tracks.n_tracks, in_range=False))
 
 
 def with_confidence(tracks: Tracks, found: Examined) -> Tracks:
@@ -117,9 +114,7 @@ def with_confidence(tracks: Tracks, found: Examined) -> Tracks:
         Result of `examine` for them.
     """
     parts, order = found.parts, tracks.by_track[0]
-    features = part_features(found.evidence, parts.weakest, parts.n_detections, in_range=True)
-    known = part_probability(features, IDENTITY)
-    probability = _probability(found, known, tracks.n_tracks)
+    probability = _probability(found, tracks.n_tracks, in_range=True)
     identity = np.where(tracks.labels >= 0, WHOLE, 0.0)
     for p in np.flatnonzero(probability < WHOLE):
         identity[order[parts.offsets[p] : parts.offsets[p + 1]]] = probability[p]
@@ -267,12 +262,14 @@ def _joins(tracks: Tracks, stitching: Stitching) -> tuple[NDArray[np.int64], NDA
     return then, p
 
 
-def _probability(found: Examined, known: NDArray[np.float64], n_tracks: int) -> NDArray[np.float64]:
+def _probability(found: Examined, n_tracks: int, *, in_range: bool) -> NDArray[np.float64]:
     """Return the probability that each part is on the marker of its track.
 
-    Those with enough distances have the one that is `known` by them.
+    An unknown marker is compared by the ranges of the distances, or by their median deviations.
     """
     parts = found.parts
+    features = part_features(found.evidence, parts.weakest, parts.n_detections, in_range=in_range)
+    known = part_probability(features, IDENTITY if in_range else PART)
     probability = np.where(found.evidence.is_known, known, _chained(parts, n_tracks))
     whole = track_probability(parts.n_detections)
     return np.minimum(np.where(parts.is_whole(n_tracks), whole, probability), WHOLE)
