@@ -22,10 +22,10 @@ struct LearntDistance {
   bool is_known() const { return median >= 0; }
 };
 
-namespace distances {
+namespace learnt_distance {
 
-inline constexpr std::size_t kMinFrames = 6;
-inline constexpr double kBend = 0.02;        // spread of a distance as a share of it
+inline constexpr std::size_t kLeastFrames = 6;
+inline constexpr double kBendShare = 0.02;        // spread of a distance as a share of it
 inline constexpr double kOfNormal = 1.4826;  // standard deviation per median deviation
 inline constexpr double kMost = 0.8, kOfMost = 0.7803;  // and per deviation of that rank
 
@@ -48,17 +48,17 @@ inline bool is_surely_loose(std::span<const double> squares, double median, doub
   return n_near <= squares.size() / 2;
 }
 
-}  // namespace distances
+}  // namespace learnt_distance
 
 // Learns a distance from its squares, which are overwritten. `floor2` is the least squared spread,
 // by the noise of both markers. With `only_steady`, a distance may be found to be loose before its
 // spread is computed, which saves time, because most distances between segments are.
 inline LearntDistance learn_distance(std::vector<double>& squares, double floor2, bool only_steady) {
-  using namespace distances;
-  if (squares.size() < kMinFrames) return {};
+  using namespace learnt_distance;
+  if (squares.size() < kLeastFrames) return {};
   // The root of the median is the median of the roots, which most of the time are not needed.
   LearntDistance found{std::sqrt(median_of(squares))};
-  const double bend = kBend * found.median, least = floor2 + bend * bend;
+  const double bend = kBendShare * found.median, least = floor2 + bend * bend;
   if (only_steady && is_surely_loose(squares, found.median, least)) return {LearntDistance::kLoose};
   std::vector<double>& deviations = squares;
   for (double& value : deviations) value = std::abs(std::sqrt(value) - found.median);
