@@ -64,17 +64,18 @@ def maximise(
     (array([0.3, 1.5]), -12.5)
     """
     n = len(start)
-    nearby = NEAR * np.vstack([np.zeros(n), np.eye(n), -np.eye(n)])
+    nearby = NEAR * np.vstack([np.eye(n), -np.eye(n)])
 
-    def values_around(
-        x: NDArray[np.float64],
-    ) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
-        """Return the value at x, and those above and below along each parameter."""
-        found = np.asarray(log_likelihoods(x + nearby))
-        return float(found[0]), found[1 : n + 1], found[n + 1 :]
+    def value_at(x: NDArray[np.float64]) -> float:
+        return float(log_likelihoods(x[None])[0])
+
+    def values_around(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the values above and below along each parameter, shape (2, n)."""
+        return np.asarray(log_likelihoods(x + nearby)).reshape(2, n)
 
     x = np.clip(start, low, high)
-    value, up, down = values_around(x)
+    value = value_at(x)
+    up, down = values_around(x)
     gradient = (up - down) / (2 * NEAR)
     along = (2 * value - up - down) / NEAR**2
     curvature = np.diag(np.maximum(np.abs(along), MIN_CURVATURE))
@@ -90,12 +91,12 @@ def maximise(
         step *= min(1.0, MAX_STEP / float(np.abs(step).max()))
         for _ in range(MAX_HALVINGS):
             following = np.minimum(np.maximum(x + step, low), high)
-            reached, up, down = values_around(following)
-            if reached > value:
+            if (reached := value_at(following)) > value:
                 break
             step /= 2
         else:
             break
+        up, down = values_around(following)
         slope = (up - down) / (2 * NEAR)
         _update(curvature, following - x, gradient - slope)
         x, value, gradient = following, reached, slope
