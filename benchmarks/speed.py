@@ -1,7 +1,9 @@
 """Speed of the frame-by-frame methods beside a SciPy + NumPy loop, in one process, on one core.
 
 Scene: `simulate.smooth`, 10 % missing, 10 % clutter, noise 0.005; model with one motion at the
-scene's own scale, and the same with three. Each figure is the best of several runs.
+scene's own scale, and the same with three. Each figure is the best of several runs. The time of a
+move is that of the report's chain on the report's cube (10 % missing, 10 % clutter): the difference
+between 250 and 25 moves a frame and marker, over the moves.
 
     python benchmarks/speed.py [--markdown FILE]
 """
@@ -13,6 +15,7 @@ import statistics
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -92,6 +95,21 @@ def frames_a_second() -> list[list[str]]:
     return rows
 
 
+def move_seconds(n_motions: int) -> float:
+    """Time of a move of the report's chain."""
+    cube = am.simulate.corrupt(am.simulate.cube(seed=1), missing=0.1, clutter=0.1, seed=2)
+    model = am.estimate_model(cube.detections).model
+    three = model.motion
+    assert isinstance(three, am.InteractingMotions)
+    model = replace(model, motion=three.models[-1] if n_motions == 1 else three)
+    seconds, n_moves = [], []
+    for moves in (25, 250):
+        chain = am.MCMCDA.report_2010(moves=moves)
+        seconds.append(best_of(5, lambda c=chain: am.track(cube.detections, c, model=model)))
+        n_moves.append(am.track(cube.detections, chain, model=model).info["moves"])
+    return (seconds[1] - seconds[0]) / (n_moves[1] - n_moves[0])
+
+
 def import_seconds(code: str) -> float:
     """Time of a fresh interpreter that runs `code`, less that of an empty one; median of five."""
 
@@ -133,6 +151,9 @@ def main() -> None:
         f"`import asterism`: {light:.2f} s; with reading C3D: {c3d:.2f} s. Ten minutes of 100 "
         f"markers at 120 Hz, model estimated and tracked: peak memory {int(out[1]) / 1e6:.2f} GB, "
         f"of which {int(out[0]) / 1e6:.2f} GB were there with the capture alone; {out[2]} tracks.",
+        "",
+        "A move of the report's chain, on its cube: "
+        f"{1e6 * move_seconds(1):.3f} µs with one motion, {1e6 * move_seconds(3):.3f} with three.",
         "",
         f"{conditions()}; one core.",
     ]
