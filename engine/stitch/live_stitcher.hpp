@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/scratch.hpp"
 #include "base/shared_copy.hpp"
 #include "rigid/carried_state.hpp"
 #include "stitch/stitcher.hpp"
@@ -52,6 +53,8 @@ class LiveStitcher {
     n_seen_ += static_cast<std::int64_t>(points.size());
     if (recent_.size() > n_waiting_) take(recent_[recent_.size() - 1 - n_waiting_].own());
     stitcher_.guess();
+    waiting_.clear();
+    markers_.clear();
     for (SharedCopy<Recent>& frame : recent_)
       if (!frame->is_taken)
         report_waiting(frame.own(), report);
@@ -177,8 +180,11 @@ class LiveStitcher {
   }
   template <typename Report>
   void report_waiting(Recent& frame, Report&& report) {
-    const std::vector<std::int32_t> markers = markers_of(frame.labels);
-    for (std::size_t i = 0; i < markers.size(); ++i) report_one(frame, i, markers[i], report);
+    if (markers_.empty() || !std::ranges::equal(waiting_, frame.labels)) {  // often they are the same
+      waiting_.assign(frame.labels.begin(), frame.labels.end());
+      markers_of(waiting_).swap(markers_);
+    }
+    for (std::size_t i = 0; i < markers_.size(); ++i) report_one(frame, i, markers_[i], report);
   }
   template <typename Report>
   void report_one(Recent& frame, std::size_t i, std::int32_t marker, Report&& report) {
@@ -192,7 +198,9 @@ class LiveStitcher {
   std::int64_t n_seen_ = 0, n_joins_ = 0, n_ghosts_ = 0;
   std::deque<SharedCopy<Recent>> recent_;
   // Scratch of one frame.
-  std::vector<std::int32_t> tracklets_;
+  Scratch<std::vector<std::int32_t>> tracklets_;
+  Scratch<std::vector<std::int64_t>> waiting_;  // labels of the last waiting frame
+  Scratch<std::vector<std::int32_t>> markers_;  // and their markers
 };
 
 }  // namespace asterism
