@@ -33,9 +33,9 @@ def named_only(truth: am.Tracks) -> am.Tracks:
     return am.simulate.corrupt(truth)
 
 
-def corrupted(truth: am.Tracks) -> am.Tracks:
+def corrupted(truth: am.Tracks, seed: int = 1) -> am.Tracks:
     """10 % of the detections missing, 10 % clutter, 0.3 mm of noise."""
-    return am.simulate.corrupt(truth, missing=0.1, clutter=0.1, noise=3e-4, seed=1)
+    return am.simulate.corrupt(truth, missing=0.1, clutter=0.1, noise=3e-4, seed=seed)
 
 
 def score(

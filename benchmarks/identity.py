@@ -27,8 +27,8 @@ from methods import METHODS as QUICK
 from report import conditions, publish, table
 
 
-def bursts(truth: am.Tracks) -> am.Tracks:
-    return am.simulate.corrupt(truth, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=1)
+def bursts(truth: am.Tracks, seed: int = 1) -> am.Tracks:
+    return am.simulate.corrupt(truth, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=seed)
 
 
 def half_rate(truth: am.Tracks, seed: int = 1) -> am.Tracks:

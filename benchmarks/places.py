@@ -1,7 +1,7 @@
 """Places to check: how many are right, and how many switches they list.
 
 Simulated people with seeds that the calibration does not use, and the captures of
-``../shared/data`` (or ``--data``) in four conditions. A switch is a run of detections that are of
+``../shared/data`` (or ``--data``) in four conditions, three seeds each. A switch is a run of detections that are of
 another marker than most of their track; runs where the labels of the file are wrong are counted
 and left out (`wrong.py`). Precision: share of the first 20 places with wrong detections, of
 another marker or of clutter, in one of their tracks within half a second; places where the labels
@@ -23,12 +23,14 @@ import numpy as np
 import asterism as am
 from asterism.reporting.places import Place, places_of
 from calibration import CORRUPTED, SCENES
-from captures import captures
-from identity import CONDITIONS
+from captures import captures, corrupted, named_only
+from identity import HALF, bursts, half_rate
 from report import conditions, publish, table
 from wrong import Run, wrong_runs
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
 LISTED = 20
@@ -36,6 +38,8 @@ FEW = 15
 NEAR_SECONDS = 0.5
 """Longest time from a place to a switch that it lists."""
 SEEDS = (31, 32)
+"""Of simulated people."""
+CAPTURE_SEEDS = (1, 2, 3)
 
 
 def holds(place: Place, run: Run, times: NDArray[np.float64]) -> bool:
@@ -88,6 +92,14 @@ class Group:
         return [name, *means, rate, str(self.errors)]
 
 
+def conditions_of(tracks: am.Tracks) -> Iterator[tuple[str, str, am.Tracks]]:
+    """Yield the condition, what it is called, and the capture, by each seed where that is random."""
+    yield "as captured", "as captured", named_only(tracks)
+    for name, corrupt in {"10 %/10 %": corrupted, "bursts": bursts, HALF: half_rate}.items():
+        for seed in CAPTURE_SEEDS:
+            yield name, f"{name}, seed {seed}", corrupt(tracks, seed)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     beside = Path(__file__).resolve().parents[2] / "shared" / "data"
@@ -108,11 +120,10 @@ def main() -> None:
         capture = am.read(path)
         if not any(capture.names):
             continue
-        for condition, corrupt in CONDITIONS.items():
-            truth = corrupt(capture.tracks)
+        for condition, called, truth in conditions_of(capture.tracks):
             own = groups.setdefault(f"captures, {condition}", Group())
             row = own.add(am.track(truth.detections, marker_set=()), truth)
-            each.append([f"{path.name}, {condition}", *row])
+            each.append([f"{path.name}, {called}", *row])
             print(*each[-1], sep=" | ", flush=True)
     head = (
         "results",

@@ -1,7 +1,8 @@
 """Speed of the frame-by-frame methods beside a SciPy + NumPy loop, in one process, on one core.
 
 Scene: `simulate.smooth`, 10 % missing, 10 % clutter, noise 0.005; model with one motion at the
-scene's own scale, and the same with three. Each figure is the best of several runs. The time of a
+scene's own scale, and the same with three. Frames per second are those of the association alone, and
+each figure is the best of several runs. The time of a
 move is that of the report's chain on the report's cube (10 % missing, 10 % clutter): the difference
 between 250 and 25 moves a frame and marker, over the moves.
 
@@ -21,6 +22,7 @@ from pathlib import Path
 import numpy as np
 
 import asterism as am
+from asterism.tracking.methods.associate import associate
 from methods import METHODS
 from peers.numpy_loop import track_in_numpy
 from report import best_of, conditions, publish
@@ -68,9 +70,9 @@ def beside_the_loop(d: am.Detections, model: am.TrackingModel) -> list[str]:
     first = am.Detections(
         times=d.times[:n], offsets=d.offsets[: n + 1], points=d.points[: d.offsets[n]]
     )
-    ours = best_of(3, lambda: am.track(first, am.GNN(), model=model))
+    ours = best_of(3, lambda: associate(am.GNN(), first, model, score=False))
     theirs = best_of(2, lambda: track_in_numpy(first, model))
-    same = track_in_numpy(first, model) == am.track(first, am.GNN(), model=model).labels
+    same = track_in_numpy(first, model) == associate(am.GNN(), first, model).labels
     return [f"{n / theirs:,.0f}", f"{theirs / ours:.0f} ×", f"{100 * same.mean():.2f} %"]
 
 
@@ -78,8 +80,8 @@ def row_of(capture: am.Tracks, n_markers: int, motions: int) -> list[str]:
     d, model = capture.detections, model_of(capture, motions)
     row = [str(n_markers), str(motions)]
     for method in METHODS.values():
-        seconds = best_of(3, lambda m=method: am.track(d, m, model=model))
-        idf1 = am.evaluate(am.track(d, method, model=model), capture).idf1
+        seconds = best_of(3, lambda m=method: associate(m, d, model, seed=0, score=False))
+        idf1 = am.evaluate(associate(method, d, model, seed=0), capture).idf1
         row.append(f"{d.n_frames / seconds:,.0f} ({idf1:.4f})")
     taken = step_times(d, model)
     row += [f"{statistics.median(taken) * 1e3:.3f}", f"{np.quantile(taken, 0.99) * 1e3:.3f}"]
@@ -105,8 +107,8 @@ def move_seconds(n_motions: int) -> float:
     seconds, n_moves = [], []
     for moves in (25, 250):
         chain = am.MCMCDA.report_2010(moves=moves)
-        seconds.append(best_of(5, lambda c=chain: am.track(cube.detections, c, model=model)))
-        n_moves.append(am.track(cube.detections, chain, model=model).info["moves"])
+        seconds.append(best_of(5, lambda c=chain: associate(c, cube.detections, model)))
+        n_moves.append(associate(chain, cube.detections, model).info["moves"])
     return (seconds[1] - seconds[0]) / (n_moves[1] - n_moves[0])
 
 

@@ -59,6 +59,8 @@ FIT_POINTS = 8_000
 """Number of detections in the frames to which motion and noise are fitted."""
 COUNT_POINTS = 30_000
 """Number of detections in the frames in which events are counted."""
+UNIT_POINTS = 2_000
+"""Number of detections by which the unit of length is checked."""
 WIDER = 3.0
 """Factor on the strongest motion of the model that finds the tracks for the motion fit."""
 MIN_NOISE = 2e-4
@@ -227,7 +229,7 @@ def _fitted(
 
 def _check_units(detections: Detections) -> None:
     """Log a warning if a tenth of the points is too far from the centre for metres."""
-    points = detections.points[:: 1 + detections.n_points // COUNT_POINTS]
+    points = detections.points[:: 1 + detections.n_points // UNIT_POINTS]
     spread = np.abs(points - np.median(points, axis=0)).max(axis=1)
     far = quantile(spread, 0.9)
     if far > MAX_EXTENT:

@@ -149,9 +149,9 @@ class Evidence:
                 f"{n_links}",
                 "give a model",
             )
-        velocities = np.diff(d.points[order], axis=0)[is_link]
-        velocities /= np.diff(d.times[frame])[is_link, None]
-        squares = (velocities**2).sum(axis=1)
+        move = np.diff(d.points[order], axis=0)
+        squares = np.einsum("nd,nd->n", move, move)[is_link]
+        squares /= np.diff(d.times[frame])[is_link] ** 2
         return cls(
             runs=runs,
             labels=labels,
