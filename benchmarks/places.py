@@ -1,13 +1,13 @@
 """Places to check: how many are right, and how many switches they list.
 
 Simulated people with seeds that the calibration does not use, and the captures of
-``../shared/data`` (or ``--data``) in four conditions, three seeds each. A switch is a run of detections that are of
-another marker than most of their track; runs where the labels of the file are wrong are counted
-and left out (`wrong.py`). Precision: share of the first 20 places with wrong detections, of
-another marker or of clutter, in one of their tracks within half a second; places where the labels
-of the file alone are wrong do not count. Recall: share of the
-switches in the first 20 places, where there are at most 15. Perfect results have no wrong
-detection; of these, places a minute.
+``../shared/data`` (or ``--data``) in four conditions, three seeds each. A switch is a run of
+detections that are of another marker than most of their track; runs where the labels of the file
+are wrong are counted and left out (`wrong.py`). Precision: share of the first 20 places with wrong
+detections, of another marker or of clutter, in one of their tracks within half a second; places
+where the labels of the file alone are wrong do not count. Recall: share of the switches in the
+first 20 places, where there are at most 15. Perfect results have no wrong detection; of these,
+places a minute.
 
     python benchmarks/places.py [--data FOLDER] [--markdown FILE]
 """
@@ -93,7 +93,7 @@ class Group:
 
 
 def conditions_of(tracks: am.Tracks) -> Iterator[tuple[str, str, am.Tracks]]:
-    """Yield the condition, what it is called, and the capture, by each seed where that is random."""
+    """Yield each condition, the name of the row, and the capture, by seeds where it is random."""
     yield "as captured", "as captured", named_only(tracks)
     for name, corrupt in {"10 %/10 %": corrupted, "bursts": bursts, HALF: half_rate}.items():
         for seed in CAPTURE_SEEDS:

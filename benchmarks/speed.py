@@ -1,10 +1,10 @@
 """Speed of the frame-by-frame methods beside a SciPy + NumPy loop, in one process, on one core.
 
 Scene: `simulate.smooth`, 10 % missing, 10 % clutter, noise 0.005; model with one motion at the
-scene's own scale, and the same with three. Frames per second are those of the association alone, and
-each figure is the best of several runs. The time of a
-move is that of the report's chain on the report's cube (10 % missing, 10 % clutter): the difference
-between 250 and 25 moves a frame and marker, over the moves.
+scene's own scale, and the same with three. Frames per second are those of the association alone,
+and each figure is the best of several runs. The time of a move is that of the report's chain on the
+report's cube (10 % missing, 10 % clutter): the difference between 250 and 25 moves a frame and
+marker, over the moves.
 
     python benchmarks/speed.py [--markdown FILE]
 """

@@ -3,8 +3,9 @@
 Wall time of two cores against one. The machine may be shared, so a loop that neither allocates nor
 holds the interpreter's lock (PBKDF2 of the standard library) is measured in the same rounds. Its
 ratio is what the machine allows. Times are the least of the rounds, because others disturb two
-threads more than one, and the share is that of the machine's ratio. Each row checks that both ways give the same bytes. Groups are those of the scene
-`simulate.dense`; their rows measure the association alone.
+threads more than one, and the share is that of the machine's ratio. Each row checks that both ways
+give the same bytes. Groups are those of the scene `simulate.dense`; their rows measure the
+association alone.
 
     python benchmarks/threads.py [--rounds N] [--markdown FILE]
 """

@@ -15,10 +15,11 @@ namespace asterism {
 inline std::vector<ExchangedStretch> stretches_of_pairs(const UsualDistances& all,
                                                         const MotionModel& m, const Timeline& line,
                                                         double p_detection, double noise,
+                                                        bool by_spreads,
                                                         std::span<const char> is_examined) {
   constexpr double kNear = 0.3;  // usual distance of tracks that are compared, metres
   std::vector<ExchangedStretch> found;
-  ExchangedPair pair(all, m, line, p_detection, noise);
+  ExchangedPair pair(all, m, line, p_detection, noise, by_spreads);
   for (std::int32_t a = 0; a < all.n_tracks(); ++a)
     for (std::int32_t b = a + 1; b < all.n_tracks(); ++b)
       if ((is_examined[a] || is_examined[b]) && all.usual(a, b) < kNear) pair.find(a, b, found);

@@ -1,12 +1,13 @@
 // The stretches of frames in which two tracks have each other's marker, by the distances that both
 // keep to other tracks.
 //
-// Where two tracks are exchanged, their distances to a third marker are exchanged too. The
-// difference of both distances then changes its sign, so that the frames of a pair fall into two
-// groups whichever group is right; the larger one counts as right. With the medians
-// m of the distances d of both tracks, frame by frame,
+// Where two tracks are exchanged, their distances to a third marker are exchanged too. If these
+// differ, their difference changes its sign, so that the frames of a pair fall into two groups
+// whichever group is right; the larger one counts as right. If too few differ, the tracks may still
+// differ in how steady their distances are, and the search begins without an exchange. With the
+// medians m and the spreads s of the distances d of both tracks, frame by frame,
 //
-//   e = w Σ_r [ t(d_ar; m_br) + t(d_br; m_ar) - t(d_ar; m_ar) - t(d_br; m_br) ]
+//   e = w Σ_r [ t(d_ar; m_br, s_br) + t(d_br; m_ar, s_ar) - t(d_ar; m_ar, s_ar) - t(d_br; m_br, s_br) ]
 //
 // is the evidence that they are exchanged: t is the log density of Student's t, each difference is
 // bounded, and w is small because the errors of neighbours and of successive frames are alike. The
@@ -37,18 +38,22 @@ struct ExchangedStretch {
 // The search in one pair of tracks after another.
 class ExchangedPair {
  public:
-  // `noise` is the standard deviation of a coordinate.
+  // `noise` is the standard deviation of a coordinate. Without `by_spreads`, pairs whose distances do
+  // not differ are left out.
   ExchangedPair(const UsualDistances& all, const MotionModel& m, const Timeline& line,
-                double p_detection, double noise)
+                double p_detection, double noise, bool by_spreads)
       : all_(all), m_(m), line_(line), p_detection_(p_detection),
-        floor2_(2 * std::max(noise * noise, kMinNoise * kMinNoise)) {}
+        floor2_(2 * std::max(noise * noise, kMinNoise * kMinNoise)), by_spreads_(by_spreads) {}
 
   // Appends the stretches of a pair.
   void find(std::int32_t a, std::int32_t b, std::vector<ExchangedStretch>& found) {
     one_ = a, other_ = b;
     if (!choose_references() || !separate()) return;
-    for (int n = 0; n < 2; ++n)
+    for (int n = 0; n < (by_middles_ ? kRounds : kMoreRounds); ++n) {
+      before_ = is_exchanged_;
       if (!weigh()) return;
+      if (is_exchanged_ == before_) break;  // another round would learn the same
+    }
     if (std::ranges::count(is_exchanged_, 1) == 0) return;
     ExchangeSearch motion(m_, line_, p_detection_);
     for (const std::int32_t k : {a, b}) motion.add(all_.points(k), all_.frames(k));
@@ -70,6 +75,10 @@ class ExchangedPair {
   static constexpr std::size_t kMinKnown = 10;  // frames
   static constexpr double kMinPresent = 0.5;    // share of the frames in which a reference is present
   static constexpr double kMinContrast = 2;     // smallest difference of medians, in deviations
+  static constexpr double kMinDivergence = 1;   // smallest one of the distances of both tracks, nats
+  static constexpr double kMinTogether = 0.25;  // share of a stretch with both tracks, if by spreads
+  static constexpr int kRounds = 2;             // of learning the distances, at most
+  static constexpr int kMoreRounds = 5;         // the same by spreads, from no exchange on
   static constexpr double kMinNoise = 2e-3;     // metres
   static constexpr double kBend = 0.02;         // spread of a distance as a share of it
   static constexpr double kBound = 5;           // of the evidence of one distance
@@ -87,10 +96,14 @@ class ExchangedPair {
     std::int32_t track = 0;
     double deviation = 0;
   };
+  // The distances of both tracks to a third one.
+  struct Usual {
+    double middle = 0, variance = 0;
+  };
   struct Known {
-    double negated = 0;  // contrast
+    double negated = 0;  // divergence of both
     std::int32_t track = 0;
-    double of_one = 0, of_other = 0, variance = 0;
+    Usual of_one, of_other;
   };
   struct Edge {
     std::size_t at = 0;  // index of the frame before which the tracks are exchanged
@@ -116,7 +129,8 @@ class ExchangedPair {
     return references_.size() > kMinReferences;
   }
 
-  // Separates the frames by the sign of the differences of the distances.
+  // Separates the frames by the sign of the differences of the distances. Returns whether there may
+  // be an exchange.
   bool separate() {
     const std::span a = all_.frames(one_), b = all_.frames(other_);
     frames_.clear();
@@ -131,14 +145,17 @@ class ExchangedPair {
     }
     is_exchanged_.assign(frames_.size(), 0);
     if (together_.size() < UsualDistances::kMinTogether) return false;
-    keep_contrasting();
-    if (references_.size() < kMinReferences) return false;
+    find_contrasts();
+    by_middles_ = contrasts_.size() >= kMinReferences;
+    if (!by_middles_) return by_spreads_;
+    references_.clear();
+    for (const Contrast& c : contrasts_) references_.push_back(c.track);
     const std::vector<double> direction = main_direction();
     std::size_t n_negative = 0;
     for (const std::size_t u : together_) {
       scale_differences(frames_[u]);
       double sum = 0;
-      for (std::size_t r = 0; r < references_.size(); ++r) sum += direction[r] * scaled_[r];
+      for (std::size_t r = 0; r < contrasts_.size(); ++r) sum += direction[r] * scaled_[r];
       is_exchanged_[u] = sum <= 0;
       n_negative += sum <= 0;
     }
@@ -146,8 +163,8 @@ class ExchangedPair {
       for (const std::size_t u : together_) is_exchanged_[u] = !is_exchanged_[u];
     return n_negative > 0 && n_negative < together_.size();  // most pairs have one side only
   }
-  // Keeps the references whose distances differ most, without regard to the sign.
-  void keep_contrasting() {
+  // Finds the references whose distances differ most, without regard to the sign.
+  void find_contrasts() {
     contrasts_.clear();
     const std::size_t n = std::min(together_.size(), kSampled);
     for (const std::int32_t r : references_) {
@@ -174,25 +191,19 @@ class ExchangedPair {
     std::ranges::sort(contrasts_, {},
                       [](const Contrast& c) { return std::pair(c.negated, c.track); });
     contrasts_.resize(std::min(contrasts_.size(), kReferences));
-    references_.clear();
-    deviations_.clear();
-    for (const Contrast& c : contrasts_) {
-      references_.push_back(c.track);
-      deviations_.push_back(c.deviation);
-    }
   }
-  // Differences of the distances to each reference in deviations, 0 where it is absent.
+  // Differences of the distances to each of these in deviations, 0 where it is absent.
   void scale_differences(std::int64_t t) {
     const Point &a = *all_.find(one_, t), &b = *all_.find(other_, t);
-    scaled_.assign(references_.size(), 0);
-    for (std::size_t r = 0; r < references_.size(); ++r)
-      if (const Point* at = all_.find(references_[r], t); at != nullptr)
-        scaled_[r] = std::clamp((all_.between(a, *at) - all_.between(b, *at)) / deviations_[r],
-                                -10.0, 10.0);
+    scaled_.assign(contrasts_.size(), 0);
+    for (std::size_t r = 0; r < contrasts_.size(); ++r)
+      if (const Point* at = all_.find(contrasts_[r].track, t); at != nullptr)
+        scaled_[r] = std::clamp(
+            (all_.between(a, *at) - all_.between(b, *at)) / contrasts_[r].deviation, -10.0, 10.0);
   }
   // The direction in which the differences vary most, by power iteration.
   std::vector<double> main_direction() {
-    const std::size_t R = references_.size(), n = std::min(together_.size(), kSampled);
+    const std::size_t R = contrasts_.size(), n = std::min(together_.size(), kSampled);
     std::vector<double> moments(R * R, 0), direction(R, 0), next(R);
     for (std::size_t k = 0; k < n; ++k) {
       scale_differences(frames_[together_[k * together_.size() / n]]);
@@ -228,8 +239,12 @@ class ExchangedPair {
       for (const Known& k : known_) {
         const Point* at = all_.find(k.track, frames_[u]);
         if (at == nullptr) continue;
-        if (a != nullptr) sum += ratio(all_.between(*a, *at), k.of_other, k.of_one, k.variance);
-        if (b != nullptr) sum += ratio(all_.between(*b, *at), k.of_one, k.of_other, k.variance);
+        Usual one = k.of_one, other = k.of_other;
+        // Of a track alone, any odd distance fits the looser one of both better.
+        if (a == nullptr || b == nullptr)
+          one.variance = other.variance = std::max(one.variance, other.variance);
+        if (a != nullptr) sum += ratio(all_.between(*a, *at), other, one);
+        if (b != nullptr) sum += ratio(all_.between(*b, *at), one, other);
       }
       evidence_[u] = kWeight * sum;
     }
@@ -242,10 +257,12 @@ class ExchangedPair {
       }
     return true;
   }
-  // Log density ratio of a distance under two medians: Student's t with four degrees of freedom.
-  static double ratio(double d, double middle, double against, double variance) {
-    const double x = (d - middle) * (d - middle), y = (d - against) * (d - against);
-    return std::clamp(2.5 * std::log((4 * variance + y) / (4 * variance + x)), -kBound, kBound);
+  // Log density ratio of a distance of two tracks: Student's t with four degrees of freedom.
+  static double ratio(double d, const Usual& one, const Usual& other) {
+    const double x = (d - one.middle) * (d - one.middle) / one.variance,
+                 y = (d - other.middle) * (d - other.middle) / other.variance;
+    return std::clamp(2.5 * std::log((4 + y) / (4 + x)) + std::log(other.variance / one.variance) / 2,
+                      -kBound, kBound);
   }
   // Learns the distances of both tracks, as exchanged so far.
   void learn() {
@@ -264,17 +281,22 @@ class ExchangedPair {
             values[side ^ static_cast<std::size_t>(is_exchanged_[u])].push_back(all_.between(*p, *at));
       }
       if (values[0].size() < kMinKnown || values[1].size() < kMinKnown) continue;
-      const MiddleAndSpread a = middle_and_spread(values[0]), b = middle_and_spread(values[1]);
-      const double variance = std::max(variance_of(a), variance_of(b));
-      const double contrast = std::abs(a.middle - b.middle) / std::sqrt(variance);
-      if (contrast > kMinContrast) known_.push_back({-contrast, r, a.middle, b.middle, variance});
+      Usual a = usual(values[0]), b = usual(values[1]);
+      if (by_middles_) a.variance = b.variance = std::max(a.variance, b.variance);
+      // The divergence of normal distributions, from each to the other.
+      const double off2 = (a.middle - b.middle) * (a.middle - b.middle);
+      const double divergence =
+          ((a.variance + off2) / b.variance + (b.variance + off2) / a.variance) / 2 - 1;
+      if (divergence > (by_middles_ ? kMinContrast * kMinContrast : kMinDivergence))
+        known_.push_back({-divergence, r, a, b});
     }
     std::ranges::sort(known_, {}, [](const Known& k) { return std::pair(k.negated, k.track); });
     known_.resize(std::min(known_.size(), kReferences));
   }
-  double variance_of(const MiddleAndSpread& own) const {
+  Usual usual(std::vector<double>& values) const {
+    const MiddleAndSpread own = middle_and_spread(values);
     const double bend = kBend * own.middle;
-    return own.spread * own.spread + floor2_ + bend * bend;
+    return {own.middle, own.spread * own.spread + floor2_ + bend * bend};
   }
   // The most probable sequence of states (Viterbi), each change of which has a cost.
   void decode() {
@@ -303,6 +325,8 @@ class ExchangedPair {
   // Adds a stretch with the edges that fit the motion best.
   void offer(const ExchangeSearch& motion, std::size_t first, std::size_t end,
              std::vector<ExchangedStretch>& found) {
+    if (!by_middles_ && n_together(first, end) < kMinTogether * static_cast<double>(end - first))
+      return;
     const std::vector<Edge> begins = edges(motion, first), ends = edges(motion, end);
     ExchangedStretch best;
     best.gain = -kInfinite;
@@ -314,6 +338,11 @@ class ExchangedPair {
         best = {{one_, other_}, frames_[from.at], stop, gain};
       }
     if (best.gain > kMinGain) found.push_back(best);
+  }
+  // Number of frames with both tracks.
+  double n_together(std::size_t first, std::size_t end) const {
+    return static_cast<double>(std::ranges::lower_bound(together_, end) -
+                               std::ranges::lower_bound(together_, first));
   }
   std::vector<Edge> edges(const ExchangeSearch& motion, std::size_t at) const {
     const std::size_t U = frames_.size();
@@ -345,13 +374,14 @@ class ExchangedPair {
   const MotionModel& m_;
   const Timeline& line_;
   double p_detection_, floor2_;
+  bool by_spreads_;
   std::int32_t one_ = 0, other_ = 0;
   std::vector<std::int64_t> frames_;     // with a detection of at least one track
   std::vector<std::size_t> together_;    // indices of those with both
-  std::vector<char> is_exchanged_;       // in each of `frames`
+  std::vector<char> is_exchanged_, before_;  // in each of `frames`, and before a round
   std::vector<double> evidence_, sums_;   // of each of them, and before each
   std::vector<std::int32_t> references_;
-  std::vector<double> deviations_;       // of the differences of their distances
+  bool by_middles_ = true;  // whether the middles of the distances differ enough
   std::vector<Known> known_;
   // Scratch.
   std::vector<std::pair<double, std::int32_t>> near_;

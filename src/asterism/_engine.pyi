@@ -507,6 +507,7 @@ def exchanged_stretches(
     *,
     p_detection: float,
     noise: float,
+    by_spreads: bool,
 ) -> tuple[Ints, Ints, Floats]: ...
 
 # `samples` are the frames from which the distances that each track keeps are learnt.

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-NEAR, REFERENCES, CANDIDATES, CONTRAST = 0.3, 8, 16, 2.0
-USUAL, SAMPLED, TOGETHER, KNOWN, MIN_USUAL = 150, 600, 20, 10, 5
+NEAR, REFERENCES, CANDIDATES, CONTRAST, DIVERGENCE, BOTH = 0.3, 8, 16, 2.0, 1.0, 0.25
+USUAL, SAMPLED, TOGETHER, KNOWN, MIN_USUAL, ROUNDS = 150, 600, 20, 10, 5, 5
 BEND, BOUND, WEIGHT, CHANGE, MIN_GAIN, MIN_MOTION, MOVED = 0.02, 5.0, 1 / 40, 4.0, 6.0, -30.0, 10
 
 
@@ -52,14 +52,13 @@ def decoded(evidence):
     return np.array(paths[int(score[1] > score[0])])
 
 
-def log_ratio(distance, middle, against, variance):
-    ratio = 2.5 * np.log(
-        (4 * variance + (distance - against) ** 2) / (4 * variance + (distance - middle) ** 2)
-    )
+def log_ratio(distance, middle, variance, against, its_variance):
+    x, y = (distance - middle) ** 2 / variance, (distance - against) ** 2 / its_variance
+    ratio = 2.5 * np.log((4 + y) / (4 + x)) + 0.5 * np.log(its_variance / variance)
     return np.nan_to_num(np.clip(ratio, -BOUND, BOUND))
 
 
-def stretches(positions, noise, motion):
+def stretches(positions, noise, motion, by_spreads=False):
     """Return (a, b, first frame, end, log odds) of all pairs; `motion(a, b, frame)` is theirs."""
     floor2 = 2 * max(noise, 2e-3) ** 2
     usual = usual_distances(positions)
@@ -97,25 +96,20 @@ def stretches(positions, noise, motion):
             if difference > CONTRAST * deviation:
                 contrasts.append((-difference / deviation, candidates[r], r, deviation))
         contrasts = sorted(contrasts)[:REFERENCES]
-        if len(contrasts) < 2:
-            continue
         columns = [r for _, _, r, _ in contrasts]
-        scaled = (of_a - of_b)[together][:, columns] / [deviation for *_, deviation in contrasts]
-        scaled = np.nan_to_num(np.clip(scaled, -10, 10))
-        rows = np.searchsorted(together, some)
-        _, vectors = np.linalg.eigh(scaled[rows].T @ scaled[rows])
-        side = scaled @ vectors[:, -1]
-        # The sign of the vector is that of its part along the largest moment.
-        largest = int(np.argmax((scaled[rows] ** 2).sum(axis=0)))
-        is_negative = side * np.sign(vectors[largest, -1]) <= 0
-        if 2 * is_negative.sum() > len(together):
-            is_negative = ~is_negative
-        if not is_negative.any() or is_negative.all():
-            continue
+        by_middles = len(contrasts) >= 2
         state = np.zeros(len(frames), dtype=int)
-        state[together] = is_negative
+        if by_middles:
+            sides = _sides(of_a, of_b, together, some, contrasts)
+            if not sides.any() or sides.all():
+                continue
+            state[together] = sides
+        elif by_spreads:
+            columns = list(range(len(candidates)))
+        else:
+            continue
         evidence = None
-        for _ in range(2):
+        for _ in range(2 if by_middles else ROUNDS):
             some = sampled(np.arange(len(frames)))
             known = []
             for r in columns:
@@ -125,19 +119,22 @@ def stretches(positions, noise, motion):
                 if min(len(own), len(others)) < KNOWN:
                     continue
                 (m, s), (n, t) = median_and_spread(own), median_and_spread(others)
-                variance = max(s**2 + floor2 + (BEND * m) ** 2, t**2 + floor2 + (BEND * n) ** 2)
-                if abs(m - n) > CONTRAST * np.sqrt(variance):
-                    known.append(
-                        (-abs(m - n) / np.sqrt(variance), candidates[r], r, m, n, variance)
-                    )
+                v, w = s**2 + floor2 + (BEND * m) ** 2, t**2 + floor2 + (BEND * n) ** 2
+                if by_middles:
+                    v = w = max(v, w)
+                divergence = 0.5 * ((v + (m - n) ** 2) / w + (w + (m - n) ** 2) / v) - 1
+                if divergence > (CONTRAST**2 if by_middles else DIVERGENCE):
+                    known.append((-divergence, candidates[r], r, m, v, n, w))
             known = sorted(known)[:REFERENCES]
             if len(known) < 2:
                 evidence = None
                 break
-            evidence = WEIGHT * sum(
-                log_ratio(of_a[:, r], n, m, v) + log_ratio(of_b[:, r], m, n, v)
-                for _, _, r, m, n, v in known
-            )
+            has_both = np.isin(np.arange(len(frames)), together)
+            evidence = np.zeros(len(frames))
+            for _, _, r, m, v, n, w in known:
+                v, w = (np.where(has_both, x, max(v, w)) for x in (v, w))
+                evidence += WEIGHT * log_ratio(of_a[:, r], n, w, m, v)
+                evidence += WEIGHT * log_ratio(of_b[:, r], m, v, n, w)
             state = decoded(evidence)
             if 2 * state.sum() > len(state):
                 state, evidence = 1 - state, -evidence
@@ -145,6 +142,8 @@ def stretches(positions, noise, motion):
             continue
         edges = np.flatnonzero(np.diff(np.concatenate([[0], state, [0]])))
         for first, end in edges.reshape(-1, 2):
+            if not by_middles and has_both[first:end].mean() < BOTH:
+                continue
             best = (-np.inf, 0, 0)
             for i, before in _edges(motion, a, b, frames, first):
                 for j, after in _edges(motion, a, b, frames, end):
@@ -156,6 +155,20 @@ def stretches(positions, noise, motion):
                 stop = frames[j] if j < len(frames) else frames[-1] + 1
                 found.append((int(a), int(b), int(frames[i]), int(stop), best[0]))
     return found
+
+
+def _sides(of_a, of_b, together, some, contrasts):
+    """Whether each frame with both tracks is on the rarer side of the differences."""
+    columns = [r for _, _, r, _ in contrasts]
+    scaled = (of_a - of_b)[together][:, columns] / [deviation for *_, deviation in contrasts]
+    scaled = np.nan_to_num(np.clip(scaled, -10, 10))
+    rows = np.searchsorted(together, some)
+    _, vectors = np.linalg.eigh(scaled[rows].T @ scaled[rows])
+    side = scaled @ vectors[:, -1]
+    # The sign of the vector is that of its part along the largest moment.
+    largest = int(np.argmax((scaled[rows] ** 2).sum(axis=0)))
+    is_negative = side * np.sign(vectors[largest, -1]) <= 0
+    return ~is_negative if 2 * is_negative.sum() > len(together) else is_negative
 
 
 def _edges(motion, a, b, frames, at):

@@ -49,13 +49,13 @@ def near_pairs(tracks):
     return np.argwhere(np.triu(np.nanmedian(distance, axis=0) < 0.2, 1))
 
 
-def of_engine(tracks, model, noise=NOISE):
+def of_engine(tracks, model, noise=NOISE, *, by_spreads=False):
     d, (kind, F, Q) = tracks.detections, steps_of(model.motion, tracks.detections.times)
     order, offsets = tracks.by_track
     found = _engine.exchanged_stretches(
         motion_model(model, d.n_axes), d.times, kind, F, Q, np.ascontiguousarray(d.points[order]),
         d.frame_of[order].astype(np.int64), offsets.astype(np.int64),
-        np.ones(tracks.n_tracks, dtype=bool), p_detection=0.9, noise=noise,
+        np.ones(tracks.n_tracks, dtype=bool), p_detection=0.9, noise=noise, by_spreads=by_spreads,
     )  # fmt: skip
     return [
         (*pair.tolist(), *stretch.tolist(), gain)
@@ -88,8 +88,9 @@ def motion_of(tracks, model):
     return ratio
 
 
+@pytest.mark.parametrize("by_spreads", [False, True])
 @pytest.mark.parametrize("seed", range(sized(4, 1)))
-def test_stretches_are_those_of_the_reference(seed):
+def test_stretches_are_those_of_the_reference(seed, by_spreads):
     rng = np.random.default_rng(seed)
     person = am.simulate.person(frames=160, seed=seed)
     truth = am.simulate.corrupt(person, missing=0.15, noise=NOISE, seed=seed)
@@ -99,8 +100,8 @@ def test_stretches_are_those_of_the_reference(seed):
         first, n = rng.integers(0, 140), rng.integers(5, 60)
         tracks = exchanged(tracks, pair, range(first, first + n))
     model = model_of(tracks.detections)
-    found = of_engine(tracks, model)
-    wanted = stretches(positions_of(tracks), NOISE, motion_of(tracks, model))
+    found = of_engine(tracks, model, by_spreads=by_spreads)
+    wanted = stretches(positions_of(tracks), NOISE, motion_of(tracks, model), by_spreads)
     assert [f[:4] for f in found] == [w[:4] for w in wanted]
     assert [f[4] for f in found] == pytest.approx([w[4] for w in wanted], abs=1e-6)
     assert len(found) >= 2
@@ -127,14 +128,46 @@ def test_an_exchange_is_undone(edges):
     assert n_undone >= 0.8 * len(pairs)
 
 
+def steady_and_loose(n_frames, seed):
+    """A rod of five markers, one that keeps its distances to them, and one that swings.
+
+    The last two have the same distances in the median.
+    """
+    rng = np.random.default_rng(seed)
+    t = np.arange(n_frames) * 0.01
+    swing = 0.03 * np.sin(2 * np.pi * 1.3 * t + rng.uniform(0, 6))
+    body = np.stack([0.3 * np.sin(t), 0.2 * t, 0.1 * np.cos(2 * t)], axis=1)
+    rod = [body + np.array([0, 0, 0.1 * k]) for k in range(5)]
+    steady = body + np.array([0.1, 0, 0.2])
+    loose = body + np.stack([-0.1 - swing, np.zeros(n_frames), np.full(n_frames, 0.2)], axis=1)
+    positions = np.stack([*rod, steady, loose], axis=1)
+    positions += rng.normal(0, NOISE, positions.shape)
+    positions[95:115, 5:] = positions[155:175, 5:] = np.nan
+    return am.Tracks.from_dense(t, positions, tuple("ABCDESL"))
+
+
+@pytest.mark.parametrize("seed", range(sized(4, 1)))
+def test_an_exchange_is_undone_by_the_spreads_of_distances(seed):
+    truth = steady_and_loose(300, seed)
+    d, model = truth.detections, model_of(truth.detections)
+    wrong = exchanged(truth, (5, 6), range(105, 165)).labels.astype(np.int64)
+    labels, _ = exchanged_back(d, wrong, model)
+    assert np.array_equal(labels, wrong)
+    labels, log_odds = exchanged_back(d, wrong, model, by_spreads=True)
+    assert np.array_equal(labels, truth.labels)
+    assert (log_odds[wrong != truth.labels] > 6).all()
+
+
+@pytest.mark.parametrize("by_spreads", [False, True])
 @pytest.mark.parametrize("seed", range(sized(4, 1)))
 @pytest.mark.parametrize("scene", ["person", "smooth", "fingers", "cube"])
-def test_right_tracks_are_left_alone(scene, seed):
+def test_right_tracks_are_left_alone(scene, seed, by_spreads):
     options = {"n_markers": 20} if scene == "smooth" else {}
     made = getattr(am.simulate, scene)(frames=200, seed=seed, **options)
     truth = am.simulate.corrupt(made, missing=0.1, noise=NOISE, seed=seed)
     labels = truth.labels.astype(np.int64)
-    again, log_odds = exchanged_back(truth.detections, labels, model_of(truth.detections))
+    model = model_of(truth.detections)
+    again, log_odds = exchanged_back(truth.detections, labels, model, by_spreads=by_spreads)
     assert np.array_equal(again, labels)
     assert np.isinf(log_odds).all()
 
@@ -243,7 +276,7 @@ def test_the_engine_refuses_what_does_not_fit(changes):
         "motion": motion_model(model, 3), "times": d.times, "kind": kind, "F": F, "Q": Q,
         "points": np.zeros((4, 3)), "frames": np.array([0, 1, 0, 1]),
         "offsets": np.array([0, 2, 4]), "is_examined": np.ones(2, dtype=bool),
-        "p_detection": 0.9, "noise": 0.001,
+        "p_detection": 0.9, "noise": 0.001, "by_spreads": False,
     }  # fmt: skip
     _engine.exchanged_stretches(**given)
     with pytest.raises(ValueError, match=next(iter(changes))):

@@ -28,7 +28,7 @@ from asterism.tracking.methods.associate import associate
 from asterism.tracking.naming import learn_marker_set, name_tracks
 from asterism.tracking.slow_start import after_slow_start, with_slow_start
 from asterism.tracking.stitching import stitch, tracklet_model
-from asterism.tracking.stitching.exchanged import with_markers
+from asterism.tracking.stitching.exchanged import exchanged_back, with_markers
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -186,7 +186,8 @@ def most_certain(
     with bonds must be more certain by `DOUBTFUL`, because it uses distances as the confidence does.
     Then further passes follow (`next_pass`), until one is not more certain, and an attempt with the
     motion in tracks of single frames. Every result is `refined_by_own_distances`. At the end all
-    detections of tracks with bonds are assigned once more, and tracks take lone detections. For
+    detections of tracks with bonds are assigned once more, tracks take lone detections, and tracks
+    that have each other's marker are exchanged back. For
     `progress`, the first method is half of the work, and every other attempt or pass half of what
     is left.
 
@@ -228,7 +229,7 @@ def most_certain(
         best = refined_by_own_distances(first)
     if progress is not None:
         progress(n)
-    return _with_lone_detections(_reassigned(_with_reason(best, first)))
+    return _exchanged(_with_lone_detections(_reassigned(_with_reason(best, first))))
 
 
 def _after_passes(best: Uncorrected, begin: Callable[[], Callable[[int], Any]]) -> Uncorrected:
@@ -289,6 +290,20 @@ def _with_reason(best: Uncorrected, first: Uncorrected) -> Uncorrected:
     recipe = dataclasses.replace(recipe, reason=reason)
     tracks = dataclasses.replace(best.tracks, recipe=recipe)
     return dataclasses.replace(best, tracks=tracks, recipe=recipe)
+
+
+def _exchanged(found: Uncorrected) -> Uncorrected:
+    """Exchange tracks back that have each other's marker, by their distances and their spreads.
+
+    The confidence does not see such an exchange where the distances hardly differ.
+    """
+    tracks, stitching = found.tracks, found.stitching
+    if stitching is None or not found.is_doubtful:
+        return found
+    labels, _ = exchanged_back(tracks.detections, tracks.labels, found.model, by_spreads=True)
+    if np.array_equal(labels, tracks.labels):
+        return found
+    return _with_labels(found, labels, int(tracks.info.get("refinements", 0)))
 
 
 def _reassigned(found: Uncorrected) -> Uncorrected:

@@ -26,7 +26,7 @@ ROUNDS = 5
 
 
 def exchanged_back(
-    d: Detections, labels: NDArray[np.int64], model: TrackingModel
+    d: Detections, labels: NDArray[np.int64], model: TrackingModel, *, by_spreads: bool = False
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Exchange tracks back where the distances to others show that they have each other's marker.
 
@@ -42,6 +42,10 @@ def exchanged_back(
         Track of each detection, -1 for clutter.
     model : TrackingModel
         Model of motion and noise.
+    by_spreads : bool
+        Whether tracks are compared, too, that differ only in how steady their distances are, as a
+        marker at a joint and one beyond it do. Tracks of several markers differ so as well, so that
+        these exchanges are for tracks that are otherwise final.
 
     Returns
     -------
@@ -63,6 +67,7 @@ def exchanged_back(
             motion, d.times, kind, F, Q, np.ascontiguousarray(d.points[order]),
             d.frame_of[order].astype(np.int64), offsets, is_examined,
             p_detection=min(model.sensor.p_detection, 0.999), noise=model.sensor.noise_sigma,
+            by_spreads=by_spreads,
         )  # fmt: skip
         is_examined = np.zeros(n_tracks, dtype=bool)
         for i in np.argsort(-gains, kind="stable"):
