@@ -140,3 +140,30 @@ def moving(shape, n_frames=120, seed=0, noise=0.0):
     places = np.stack([turns.apply(x) for x in shape], axis=1)
     places += np.cumsum(rng.normal(scale=0.005, size=(n_frames, 1, 3)), axis=0)
     return t, places + rng.normal(scale=noise, size=places.shape)
+
+
+def exchanged(tracks, pair, frames):
+    """Exchange two tracks in some frames."""
+    labels = tracks.labels.copy()
+    inside = np.isin(tracks.detections.frame_of, frames)
+    is_one, is_other = (inside & (tracks.labels == k) for k in pair)
+    labels[is_one], labels[is_other] = pair[1], pair[0]
+    return am.Tracks(detections=tracks.detections, labels=labels)
+
+
+def steady_and_loose(seed):
+    """A rod of five markers, one that keeps its distances to them, and one that swings.
+
+    The last two have the same distances in the median, and are occluded together twice.
+    """
+    rng = np.random.default_rng(seed)
+    t = np.arange(300) * 0.01
+    swing = 0.03 * np.sin(2 * np.pi * 1.3 * t + rng.uniform(0, 6))
+    body = np.stack([0.3 * np.sin(t), 0.2 * t, 0.1 * np.cos(2 * t)], axis=1)
+    rod = [body + np.array([0, 0, 0.1 * k]) for k in range(5)]
+    steady = body + np.array([0.1, 0, 0.2])
+    loose = body + np.stack([-0.1 - swing, np.zeros(300), np.full(300, 0.2)], axis=1)
+    positions = np.stack([*rod, steady, loose], axis=1)
+    positions += rng.normal(0, 1e-3, positions.shape)
+    positions[95:115, 5:] = positions[155:175, 5:] = np.nan
+    return am.Tracks.from_dense(t, positions, tuple("ABCDESL"))

@@ -16,7 +16,7 @@ from asterism.tracking.stitching.exchanged import (
 )
 from asterism.tracking.stitching.passes import Pass
 from tests.references.distance_exchanges import stretches
-from tests.scenes import sized
+from tests.scenes import exchanged, sized, steady_and_loose
 
 NOISE = 1e-3
 
@@ -31,15 +31,6 @@ def positions_of(tracks):
 
 def model_of(d):
     return am.tracking.tracklet_model(am.estimate_model(d).model)
-
-
-def exchanged(tracks, pair, frames):
-    """Exchange two tracks in some frames."""
-    labels = tracks.labels.copy()
-    inside = np.isin(tracks.detections.frame_of, frames)
-    is_one, is_other = (inside & (tracks.labels == k) for k in pair)
-    labels[is_one], labels[is_other] = pair[1], pair[0]
-    return am.Tracks(detections=tracks.detections, labels=labels)
 
 
 def near_pairs(tracks):
@@ -128,27 +119,9 @@ def test_an_exchange_is_undone(edges):
     assert n_undone >= 0.8 * len(pairs)
 
 
-def steady_and_loose(n_frames, seed):
-    """A rod of five markers, one that keeps its distances to them, and one that swings.
-
-    The last two have the same distances in the median.
-    """
-    rng = np.random.default_rng(seed)
-    t = np.arange(n_frames) * 0.01
-    swing = 0.03 * np.sin(2 * np.pi * 1.3 * t + rng.uniform(0, 6))
-    body = np.stack([0.3 * np.sin(t), 0.2 * t, 0.1 * np.cos(2 * t)], axis=1)
-    rod = [body + np.array([0, 0, 0.1 * k]) for k in range(5)]
-    steady = body + np.array([0.1, 0, 0.2])
-    loose = body + np.stack([-0.1 - swing, np.zeros(n_frames), np.full(n_frames, 0.2)], axis=1)
-    positions = np.stack([*rod, steady, loose], axis=1)
-    positions += rng.normal(0, NOISE, positions.shape)
-    positions[95:115, 5:] = positions[155:175, 5:] = np.nan
-    return am.Tracks.from_dense(t, positions, tuple("ABCDESL"))
-
-
 @pytest.mark.parametrize("seed", range(sized(4, 1)))
 def test_an_exchange_is_undone_by_the_spreads_of_distances(seed):
-    truth = steady_and_loose(300, seed)
+    truth = steady_and_loose(seed)
     d, model = truth.detections, model_of(truth.detections)
     wrong = exchanged(truth, (5, 6), range(105, 165)).labels.astype(np.int64)
     labels, _ = exchanged_back(d, wrong, model)

@@ -20,10 +20,13 @@ from asterism.tracking.attempts import (
     _has_bonds,
     _reassigned,
     attempt,
+    exchanged_by_spreads,
     most_certain,
     refined_by_own_distances,
 )
 from asterism.tracking.choose import ON_BODIES, partners
+from asterism.tracking.stitching.exchanged import with_markers
+from tests.scenes import exchanged, steady_and_loose
 
 
 def sensed(truth, noise=0.005, **more):
@@ -355,6 +358,26 @@ def test_names_that_make_identities_less_certain_are_not_kept(fast, monkeypatch)
     monkeypatch.setattr("asterism.tracking.attempts.name_tracks", exchanged)
     assert found.is_doubtful
     assert refined_by_own_distances(found) is found
+
+
+@pytest.mark.parametrize("is_doubtful", [True, False])
+def test_tracks_in_doubt_are_exchanged_back_by_the_spreads_of_distances(is_doubtful, monkeypatch):
+    monkeypatch.setattr("asterism.tracking.attempts.DOUBTFUL", -1.0 if is_doubtful else 1.0)
+    truth = steady_and_loose(seed=1)
+    recipe = am.tracking.plan_tracking(truth.detections).recipe
+    model = am.tracking.tracklet_model(recipe.model)
+    right = am.stitch(truth, model)
+    pair = [int(right.tracks.labels[truth.labels == k][0]) for k in (5, 6)]
+    wrong = exchanged(right.tracks, pair, range(105, 165))
+    stitching = with_markers(right, wrong.labels, np.full(len(wrong.labels), 0.95))
+    found = Uncorrected(tracks=wrong, recipe=recipe, model=model, stitching=stitching)
+    assert am.evaluate(wrong, truth).idf1 < 0.98
+    after = exchanged_by_spreads(found)
+    assert (after is not found) == is_doubtful
+    if is_doubtful:
+        assert am.evaluate(after.tracks, truth).idf1 == 1
+        assert after.stitching.tracks is after.tracks
+        assert len(after.stitching.joins) == 4  # at both ends, of both tracks
 
 
 @pytest.mark.parametrize("kept", [3, 0])

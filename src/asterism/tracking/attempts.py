@@ -40,7 +40,13 @@ if TYPE_CHECKING:
     from asterism.tracking.naming import Naming
     from asterism.tracking.stitching import Stitching
 
-__all__ = ["Uncorrected", "attempt", "most_certain", "refined_by_own_distances"]
+__all__ = [
+    "Uncorrected",
+    "attempt",
+    "exchanged_by_spreads",
+    "most_certain",
+    "refined_by_own_distances",
+]
 
 DOUBTFUL = 0.002
 """Share of the detections whose identity is expected to be wrong, from which there are further
@@ -229,7 +235,7 @@ def most_certain(
         best = refined_by_own_distances(first)
     if progress is not None:
         progress(n)
-    return _exchanged(_with_lone_detections(_reassigned(_with_reason(best, first))))
+    return exchanged_by_spreads(_with_lone_detections(_reassigned(_with_reason(best, first))))
 
 
 def _after_passes(best: Uncorrected, begin: Callable[[], Callable[[int], Any]]) -> Uncorrected:
@@ -292,20 +298,6 @@ def _with_reason(best: Uncorrected, first: Uncorrected) -> Uncorrected:
     return dataclasses.replace(best, tracks=tracks, recipe=recipe)
 
 
-def _exchanged(found: Uncorrected) -> Uncorrected:
-    """Exchange tracks back that have each other's marker, by their distances and their spreads.
-
-    The confidence does not see such an exchange where the distances hardly differ.
-    """
-    tracks, stitching = found.tracks, found.stitching
-    if stitching is None or not found.is_doubtful:
-        return found
-    labels, _ = exchanged_back(tracks.detections, tracks.labels, found.model, by_spreads=True)
-    if np.array_equal(labels, tracks.labels):
-        return found
-    return _with_labels(found, labels, int(tracks.info.get("refinements", 0)))
-
-
 def _reassigned(found: Uncorrected) -> Uncorrected:
     """Assign all detections once more, while that makes more identities certain.
 
@@ -354,6 +346,26 @@ def refined_by_own_distances(found: Uncorrected) -> Uncorrected:
             break
         best = renamed
     return best
+
+
+def exchanged_by_spreads(found: Uncorrected) -> Uncorrected:
+    """Exchange tracks back that have each other's marker, if identities are in doubt.
+
+    Tracks are compared that differ only in how steady their distances are, too. The confidence does
+    not see such an exchange, because the profiles of both tracks are learnt from it.
+
+    Parameters
+    ----------
+    found : Uncorrected
+        Tracks without names.
+    """
+    tracks = found.tracks
+    if found.stitching is None or not found.is_doubtful:
+        return found
+    labels, _ = exchanged_back(tracks.detections, tracks.labels, found.model, by_spreads=True)
+    if np.array_equal(labels, tracks.labels):
+        return found
+    return _with_labels(found, labels, int(tracks.info.get("refinements", 0)))
 
 
 def _with_labels(found: Uncorrected, labels: NDArray[np.int64], n: int) -> Uncorrected:
