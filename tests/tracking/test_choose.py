@@ -368,7 +368,7 @@ def test_tracks_in_doubt_are_exchanged_back_by_the_spreads_of_distances(is_doubt
     model = am.tracking.tracklet_model(recipe.model)
     right = am.stitch(truth, model)
     pair = [int(right.tracks.labels[truth.labels == k][0]) for k in (5, 6)]
-    wrong = exchanged(right.tracks, pair, range(105, 165))
+    wrong = exchanged(right.tracks, pair, range(105, 305))
     stitching = with_markers(right, wrong.labels, np.full(len(wrong.labels), 0.95))
     found = Uncorrected(tracks=wrong, recipe=recipe, model=model, stitching=stitching)
     assert am.evaluate(wrong, truth).idf1 < 0.98
