@@ -151,19 +151,20 @@ def exchanged(tracks, pair, frames):
     return am.Tracks(detections=tracks.detections, labels=labels)
 
 
-def steady_and_loose(seed):
+def steady_and_loose(seed, until=300):
     """A rod of five markers, one that keeps its distances to them, and one that swings.
 
-    The last two have the same distances in the median, and are occluded together twice.
+    The last two have the same distances in the median, and are occluded together twice, at
+    frame 100 and at `until`.
     """
     rng = np.random.default_rng(seed)
-    t = np.arange(600) * 0.01
+    t = np.arange(2 * until) * 0.01
     swing = 0.03 * np.sin(2 * np.pi * 1.3 * t + rng.uniform(0, 6))
     body = np.stack([0.3 * np.sin(t), 0.2 * t, 0.1 * np.cos(2 * t)], axis=1)
     rod = [body + np.array([0, 0, 0.1 * k]) for k in range(5)]
     steady = body + np.array([0.1, 0, 0.2])
-    loose = body + np.stack([-0.1 - swing, np.zeros(600), np.full(600, 0.2)], axis=1)
+    loose = body + np.stack([-0.1 - swing, np.zeros(len(t)), np.full(len(t), 0.2)], axis=1)
     positions = np.stack([*rod, steady, loose], axis=1)
     positions += rng.normal(0, 1e-3, positions.shape)
-    positions[95:115, 5:] = positions[295:315, 5:] = np.nan
+    positions[95:115, 5:] = positions[until - 5 : until + 15, 5:] = np.nan
     return am.Tracks.from_dense(t, positions, tuple("ABCDESL"))
