@@ -73,7 +73,7 @@ def full_page(path):
     order, starts = tracks.by_track
     uncertain = order[starts[0] + 20 : starts[0] + 30]  # that the first is a place to check
     identity = np.ones(len(tracks.labels))
-    identity[uncertain] = 0.4
+    identity[uncertain] = 0.35
     frames = tracks.detections.frame_of[uncertain]
     decision = am.model.Decision(
         kind="identity",
@@ -81,9 +81,9 @@ def full_page(path):
         first=int(frames[0]),
         last=int(frames[-1]),
         n_detections=10,
-        probability=0.4,
+        probability=0.35,
         alternatives=(
-            am.model.Alternative(track=1, probability=0.5),
+            am.model.Alternative(track=1, probability=0.55),
             am.model.Alternative(track=None, probability=0.1),
         ),
     )

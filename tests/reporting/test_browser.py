@@ -131,7 +131,7 @@ def test_list_leads_to_the_place(opened, person):
     assert state["speed"] == 0.25
     assert opened.run("document.getElementById('speed').value") == "0.25"
     confidence = "document.querySelector('[data-about=\"identity confidence\"]').textContent"
-    assert opened.run(confidence) == "40 %"
+    assert opened.run(confidence) == "35 %"
     # The involved markers are framed: amid the view, and apart.
     _, _, width, height = box(opened, "#scene")
     spots = np.array([opened.run(f"asterism.where({k})") for k in (0, 1)])
