@@ -342,11 +342,11 @@ def test_a_single_uncertain_detection_is_part_of_the_nearest_place():
     assert places_of(uncertain(*small, n_frames=600)) == ()
 
 
-def test_parts_that_are_more_probably_right_are_no_place_of_their_own():
+def test_parts_that_may_as_well_be_right_are_no_place_of_their_own():
     from asterism.reporting.places import places_of
 
-    wrong, right = (0, 100, 120, 0.35, []), [(1, 60, 90, 0.6, []), (2, 300, 399, 0.6, [])]
-    (place,) = places_of(uncertain(wrong, *right, n_frames=600))
+    wrong, even = (0, 100, 120, 0.35, []), [(1, 60, 90, 0.45, []), (2, 300, 399, 0.45, [])]
+    (place,) = places_of(uncertain(wrong, *even, n_frames=600))
     assert set(place.tracks) == {0, 1}
     assert (place.first, place.last) == (60, 120)
 

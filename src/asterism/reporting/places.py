@@ -98,8 +98,8 @@ def places_of(tracks: Tracks) -> tuple[Place, ...]:
         Identities and joins of a probability below 0.9, and names below 0.8. One place are parts of
         one track that follow each other, parts of two tracks that may be exchanged, and long parts
         of several tracks at one time, as of a subject that walks out and in again. A place has a
-        name, or a part or join with a probability below 0.4, and at least one expected
-        wrong detection. Other uncertain parts are in the nearest place within half a second.
+        name, or a part or join with a probability below 0.4, and at least one expected wrong
+        detection. Other uncertain parts are in the nearest place within half a second.
 
     Examples
     --------

@@ -193,9 +193,8 @@ def most_certain(
     Then further passes follow (`next_pass`), until one is not more certain, and an attempt with the
     motion in tracks of single frames. Every result is `refined_by_own_distances`. At the end all
     detections of tracks with bonds are assigned once more, tracks take lone detections, and tracks
-    that have each other's marker are exchanged back. For
-    `progress`, the first method is half of the work, and every other attempt or pass half of what
-    is left.
+    that have each other's marker are exchanged back (`exchanged_by_spreads`). For `progress`, the
+    first method is half of the work, and every other attempt or pass half of what is left.
 
     Parameters
     ----------
@@ -351,8 +350,9 @@ def refined_by_own_distances(found: Uncorrected) -> Uncorrected:
 def exchanged_by_spreads(found: Uncorrected) -> Uncorrected:
     """Exchange tracks back that have each other's marker, if identities are in doubt.
 
-    Tracks are compared that differ only in how steady their distances are, too. The confidence does
-    not see such an exchange, because the profiles of both tracks are learnt from it.
+    That includes pairs whose distances to others have the same medians and different spreads. The
+    confidence does not see such an exchange, because it learns the distances of both tracks from
+    all of their detections, the exchanged ones included.
 
     Parameters
     ----------

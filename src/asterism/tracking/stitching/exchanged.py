@@ -43,9 +43,9 @@ def exchanged_back(
     model : TrackingModel
         Model of motion and noise.
     by_spreads : bool
-        Whether tracks are compared, too, that differ only in how steady their distances are, as a
-        marker at a joint and one beyond it do. Tracks of several markers differ so as well, so that
-        these exchanges are for tracks that are otherwise final.
+        Whether pairs are included whose distances have the same medians and different spreads, as
+        those of an ankle and a toe to the knee. The spreads of a track that is on several markers
+        are large too, so that this is for tracks that are otherwise final.
 
     Returns
     -------
