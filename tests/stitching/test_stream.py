@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import asterism as am
+from asterism.model.compiled import no_transition, transition
 from asterism.simulate import Burst, Ghosts
 from tests.scenes import SANITIZED, sized, stitched
 
@@ -176,3 +177,19 @@ def test_frames_that_are_wrong_are_refused(time, points):
     state, _ = method.step(state, 0.0, [[0, 0, 0]])
     with pytest.raises(am.ParameterError):
         method.step(state, time, points)
+
+
+def test_a_stitcher_in_place_reports_what_its_copies_report():
+    truth, model = disturbed(1)
+    method, model = am.SMP(window=3), am.tracking.tracklet_model(model)
+    state, own = method.init(model), am.tracking.Stitched(method=method).init(model).stitcher
+    copied, last = own.copy(), None
+    for time, points in truth.detections:
+        state, found = method.step(state, time, points)
+        motion = model.motion
+        step = no_transition(motion) if last is None else transition(motion, time - last)
+        given = *step, points, found.labels, found.revised, found.revised_labels
+        copied, last = copied.copy(), time
+        for one, other in zip(own.step(*given), copied.step(*given), strict=True):
+            assert np.array_equal(one, other)
+    assert own.n_joins > 0
