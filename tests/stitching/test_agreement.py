@@ -47,6 +47,21 @@ def test_tracks_with_a_common_frame_are_of_two_markers(person):
     assert agreeing(both, NOISE) == []
 
 
+def test_two_tracks_of_one_time_continue_no_third_one(person):
+    """A marker is in another track for a while, and a copy of it begins where that ends."""
+    tracks = parted(person, 7, range(100, 200))
+    d, n = tracks.detections, person.n_tracks
+    rows = np.flatnonzero((tracks.labels == 7) & (d.frame_of >= 200))
+    noise = np.random.default_rng(1).normal(0, NOISE, (len(rows), 3))
+    points = np.insert(d.points, rows, d.points[rows] + noise, axis=0)
+    frame_of = np.insert(d.frame_of, rows, d.frame_of[rows])
+    labels = np.insert(tracks.labels, rows, n + 1)
+    frames = [points[frame_of == t] for t in range(d.n_frames)]
+    both = am.Tracks(detections=am.Detections.from_frames(d.times, frames), labels=labels)
+    found = agreeing(both, NOISE)
+    assert found in ([(7, n)], [(n, n + 1)])
+
+
 def test_tracks_of_two_markers_stay_apart(person):
     """One marker ends and another one begins, at other distances to all others."""
     d, labels = person.detections, person.labels

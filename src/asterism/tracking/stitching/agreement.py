@@ -54,7 +54,9 @@ def agreeing(
             break
         shares = (pairs == pairs[i]).any(axis=1)
         shares[i] = False
-        if ratio[i] - ratio[shares].max(initial=-np.inf) >= MARGIN:
+        is_clear = ratio[i] - ratio[shares].max(initial=-np.inf) >= MARGIN
+        # A track may continue one and be continued by another, which are in some frame together.
+        if is_clear and not np.isin(pairs[i], found).any():
             found.append((int(pairs[i, 0]), int(pairs[i, 1])))
     return found
 
