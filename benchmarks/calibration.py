@@ -29,7 +29,7 @@ from asterism.simulate import Burst, Ghosts, Visits
 from asterism.tracking.confidence import calibration
 from asterism.tracking.confidence.identity import Examined, examine
 from asterism.tracking.pipeline import without_edits
-from captures import captures
+from captures import captures, named_only
 from identity import CONDITIONS
 from report import conditions, publish, table
 from wrong import is_wrong, wrong_runs
@@ -170,11 +170,11 @@ class Reliability:
     def __init__(self) -> None:
         self.parts: list[tuple[Array, NDArray[np.bool_]]] = []
 
-    def add(self, tracks: am.Tracks, truth: am.Tracks) -> None:
+    def add(self, tracks: am.Tracks, truth: am.Tracks, file: am.Tracks | None = None) -> None:
         """Count the detections of one result, those with a wrong label in the file left out."""
         assert tracks.identity_confidence is not None
         inside = tracks.labels >= 0
-        for run in wrong_runs(tracks, truth):
+        for run in wrong_runs(tracks, truth, file):
             inside[run.detections] &= run.kind != "label error"
         self.parts.append((tracks.identity_confidence[inside], ~is_wrong(tracks, truth)[inside]))
 
@@ -244,12 +244,13 @@ def main() -> None:
         capture = am.read(path)
         if not any(capture.names):
             continue
+        file = named_only(capture.tracks)
         for condition, corrupt in CONDITIONS.items():
             truth = corrupt(capture.tracks)
             tracks = am.tracking.assess(*tracked(truth))
-            reliability.setdefault(f"captures, {condition}", Reliability()).add(tracks, truth)
+            reliability.setdefault(f"captures, {condition}", Reliability()).add(tracks, truth, file)
             own = Reliability()
-            own.add(tracks, truth)
+            own.add(tracks, truth, file)
             each.append(own.row(f"{path.name}, {condition}"))
             print(*each[-1], sep=" | ", flush=True)
     lines = [*table(HEAD, [r.row(name) for name, r in reliability.items()]), ""]

@@ -3,11 +3,11 @@
 Simulated people with seeds that the calibration does not use, and the captures of
 ``../shared/data`` (or ``--data``) in four conditions, three seeds each. A switch is a run of
 detections that are of another marker than most of their track; runs where the labels of the file
-are wrong are counted and left out (`wrong.py`). Precision: share of the first 20 places with wrong
-detections, of another marker or of clutter, in one of their tracks within half a second; places
-where the labels of the file alone are wrong do not count. Recall: share of the switches in the
-first 20 places, where there are at most 15. Perfect results have no wrong detection; of these,
-places a minute.
+are wrong (`wrong.py`, by the capture as recorded) are counted and left out. Precision: share of the
+first 20 places with wrong detections, of another marker or of clutter, in one of their tracks
+within half a second; places where the labels of the file alone are wrong do not count. Recall:
+share of the switches in the first 20 places, where there are at most 15. Both are means over
+results. Perfect results have no wrong detection; of these, places a minute.
 
     python benchmarks/places.py [--data FOLDER] [--markdown FILE]
 """
@@ -60,9 +60,9 @@ class Group:
         self.recall: list[float] = []
         self.places, self.minutes, self.errors = 0, 0.0, 0
 
-    def add(self, tracks: am.Tracks, truth: am.Tracks) -> list[str]:
+    def add(self, tracks: am.Tracks, truth: am.Tracks, file: am.Tracks | None = None) -> list[str]:
         """Count one result, and return its row of a table."""
-        runs, times = wrong_runs(tracks, truth), tracks.detections.times
+        runs, times = wrong_runs(tracks, truth, file), tracks.detections.times
         switches = [each for each in runs if each.kind == "switch"]
         wrong = [each for each in runs if each.kind != "label error"]
         places = places_of(tracks)
@@ -120,9 +120,12 @@ def main() -> None:
         capture = am.read(path)
         if not any(capture.names):
             continue
+        file = named_only(capture.tracks)
         for condition, called, truth in conditions_of(capture.tracks):
-            own = groups.setdefault(f"captures, {condition}", Group())
-            row = own.add(am.track(truth.detections, marker_set=()), truth)
+            tracks = am.track(truth.detections, marker_set=())
+            for of in (condition, "all"):
+                own = groups.setdefault(f"captures, {of}", Group())
+                row = own.add(tracks, truth, file)
             each.append([f"{path.name}, {called}", *row])
             print(*each[-1], sep=" | ", flush=True)
     head = (

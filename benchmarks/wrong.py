@@ -62,12 +62,25 @@ def is_wrong(tracks: am.Tracks, truth: am.Tracks) -> NDArray[np.bool_]:
     return (tracks.labels >= 0) & (truth.labels != most[tracks.labels])
 
 
-def wrong_runs(tracks: am.Tracks, truth: am.Tracks) -> list[Run]:
-    """Return the runs of wrong detections of all tracks."""
+def wrong_runs(tracks: am.Tracks, truth: am.Tracks, file: am.Tracks | None = None) -> list[Run]:
+    """Return the runs of wrong detections of all tracks.
+
+    The labels are judged as in the file, which has all detections of the run and of the frames
+    around it; without a file, as in `truth`.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks that are judged.
+    truth : Tracks
+        The same detections, with the labels of the file.
+    file : Tracks, optional
+        The capture from which the detections were taken, with the same tracks, and times.
+    """
     order, offsets = tracks.by_track
     wrong, named = is_wrong(tracks, truth), truth.labels >= 0
     frame = tracks.detections.frame_of
-    labels = Labels(truth)
+    labels = Labels(truth, file or truth)
     found: list[Run] = []
     for k in range(tracks.n_tracks):
         own = order[offsets[k] : offsets[k + 1]]
@@ -103,15 +116,19 @@ class Labels:
     Parameters
     ----------
     truth : Tracks
-        Tracks by the labels of the file.
+        Detections, with the labels of the file.
+    file : Tracks
+        The capture from which they were taken.
     """
 
-    def __init__(self, truth: am.Tracks) -> None:
-        d = truth.detections
-        self.labels, self.frame, self.points = truth.labels, d.frame_of, d.points
-        self.dense = np.full((d.n_frames, truth.n_tracks, d.n_axes), np.nan)
-        named = truth.labels >= 0
-        self.dense[self.frame[named], truth.labels[named]] = d.points[named]
+    def __init__(self, truth: am.Tracks, file: am.Tracks) -> None:
+        self.labels, self.points = truth.labels, truth.detections.points
+        times = file.detections.times
+        half = float(np.diff(times).min(initial=1.0)) / 2
+        self.frame = np.searchsorted(times, truth.detections.times - half)[
+            truth.detections.frame_of
+        ]
+        self.dense = file.positions()
 
     def is_error(self, own: Indices, begin: int, end: int, marker: int) -> bool:
         """Return whether the labels of a run of detections are wrong.
@@ -140,41 +157,52 @@ class Labels:
         return bool((np.linalg.norm(apart, axis=1) < SAME_PLACE).all())
 
     def _is_continuous(self, own: Indices, begin: int, end: int, marker: int, most: float) -> bool:
+        """Return whether the motion is continuous where the labels change, before and after."""
         votes: list[bool] = []
         for at, way in ((begin, 1), (end - 1, -1)):
-            if not 0 <= at - way < len(own):
+            if not 0 <= at - way < len(own) or self.labels[own[at - way]] != marker:
                 continue
-            inside, outside = own[at], own[at - way]
-            if abs(self.frame[inside] - self.frame[outside]) > NEXT:
-                continue
-            if self.labels[outside] != marker:
-                continue
-            label = self.labels[inside]
-            n = abs(int(self.frame[inside]) - int(self.frame[outside]))
-            velocities = self._velocity(own, at - way, -way, way), self._velocity(own, at, way, way)
-            # The same link by the labels of the file: where the marker of the track goes on, and
-            # where that of the run comes from.
-            goes_on = self.dense[self.frame[inside], marker] - self.points[outside]
-            comes_from = self.points[inside] - self.dense[self.frame[outside], label]
-            kept, *jumps = (
-                min(_length(link - n * v) for v in velocities)
-                for link in (self.points[inside] - self.points[outside], goes_on, comes_from)
-                if not np.isnan(link).any()
-            )
-            jump = min(jumps, default=CONTINUOUS / RELATIVE)
-            votes.append(jump > JUMP and kept < min(RELATIVE * jump, most))
+            outside, inside = int(self.frame[own[at - way]]), int(self.frame[own[at]])
+            links = list(self._links(outside, inside, marker, int(self.labels[own[at]])))
+            if links:
+                votes.append(any(jump > JUMP and kept < min(RELATIVE * jump, most)
+                                 for kept, jump in links))  # fmt: skip
         return bool(votes) and all(votes)
 
-    def _velocity(self, own: Indices, at: int, to: int, way: int) -> Array:
-        """Return the motion of a track a frame, in a direction of time, from one to the next."""
-        n = (
-            abs(int(self.frame[own[at + to]]) - int(self.frame[own[at]]))
-            if (0 <= at + to < len(own))
-            else NEXT + 1
-        )
-        if n > NEXT:
-            return np.zeros(self.points.shape[1])
-        return way * to * (self.points[own[at + to]] - self.points[own[at]]) / n
+    def _links(
+        self, outside: int, inside: int, marker: int, label: int
+    ) -> Iterator[tuple[float, float]]:
+        """Yield the deviations of links from one label to the other, and those of the file.
+
+        The labels may change anywhere from the last detection outside a run to the first inside.
+        """
+        way = 1 if inside > outside else -1
+        seen = [
+            [f for f in range(outside, inside + way, way) if not np.isnan(self.dense[f, k]).any()]
+            for k in (marker, label)
+        ]
+        for a, b in itertools.product(*seen):
+            n = (b - a) * way
+            if not 0 < n <= NEXT:
+                continue
+            before, after = self._velocity(marker, a, -way), self._velocity(label, b, way)
+            # The same link by the labels of the file: where the marker of the track goes on, and
+            # where that of the run comes from.
+            begin, end = self.dense[a, marker], self.dense[b, label]
+            kept, *jumps = (
+                min(_length(link - n * way * v) for v in (before, after))
+                for link in (end - begin, self.dense[b, marker] - begin, end - self.dense[a, label])
+                if not np.isnan(link).any()
+            )
+            yield kept, min(jumps, default=CONTINUOUS / RELATIVE)
+
+    def _velocity(self, label: int, frame: int, way: int) -> Array:
+        """Return the motion of a label a frame, from a frame to the next one in a direction."""
+        for n in range(1, NEXT + 1):
+            other = frame + way * n
+            if 0 <= other < len(self.dense) and not np.isnan(self.dense[other, label]).any():
+                return way * (self.dense[other, label] - self.dense[frame, label]) / n
+        return np.zeros(self.dense.shape[2])
 
     def _least_ratio(self, run: Indices, marker: int) -> float:
         """Return the smallest ratio of the labels of a run."""

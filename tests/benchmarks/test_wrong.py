@@ -80,10 +80,23 @@ def test_two_markers_in_one_place_are_no_switch():
     assert {run.kind for run in wrong_runs(exchanged(truth), truth)} == {"label error"}
 
 
-def test_no_label_of_simulated_people_is_found_wrong():
+def test_labels_are_judged_as_in_the_file():
+    """Of the labels of every third frame, one is wrong, and the detections before are missed."""
+    file = am.simulate.person(activity="run", frames=300, n_markers=40, seed=2)
+    wrong = exchanged(file)
+    labels_at = [
+        am.simulate.corrupt(each, missing=0.3, noise=3e-4, stride=3, seed=2)
+        for each in (file, wrong)
+    ]
+    assert {run.kind for run in wrong_runs(*labels_at, wrong)} == {"label error"}
+    assert {run.kind for run in wrong_runs(*labels_at[::-1], file)} == {"switch"}
+
+
+@pytest.mark.parametrize("from_file", [False, True])
+def test_no_label_of_simulated_people_is_found_wrong(from_file):
     made = am.simulate.person(activity="run", frames=300, seed=31)
     truth = am.simulate.corrupt(made, missing=0.1, clutter=0.1, noise=3e-4, stride=3, seed=31)
-    runs = wrong_runs(am.track(truth.detections, am.GNN(), stitch=True), truth)
-    kinds = [run.kind for run in runs]
+    tracks = am.track(truth.detections, am.GNN(), stitch=True)
+    kinds = [run.kind for run in wrong_runs(tracks, truth, made if from_file else None)]
     assert kinds.count("switch") > 20
     assert "label error" not in kinds

@@ -345,7 +345,7 @@ def test_a_single_uncertain_detection_is_part_of_the_nearest_place():
 def test_parts_that_may_as_well_be_right_are_no_place_of_their_own():
     from asterism.reporting.places import places_of
 
-    wrong, even = (0, 100, 120, 0.35, []), [(1, 60, 90, 0.45, []), (2, 300, 399, 0.45, [])]
+    wrong, even = (0, 100, 120, 0.45, []), [(1, 60, 90, 0.55, []), (2, 300, 399, 0.55, [])]
     (place,) = places_of(uncertain(wrong, *even, n_frames=600))
     assert set(place.tracks) == {0, 1}
     assert (place.first, place.last) == (60, 120)
