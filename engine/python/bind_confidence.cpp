@@ -10,6 +10,7 @@
 #include "confidence/distance_profiles.hpp"
 #include "confidence/exchanges.hpp"
 #include "confidence/frame_assignment.hpp"
+#include "confidence/lost_markers.hpp"
 #include "confidence/run_exchanges.hpp"
 #include "python/arrays.hpp"
 #include "python/bindings.hpp"
@@ -235,6 +236,33 @@ class Profiles {
   std::unique_ptr<DistanceProfiles> profiles_;
 };
 
+// Labels of all detections, those of lost markers among them.
+Out<std::int64_t> find_lost(const In<double>& points, const In<std::int64_t>& labels,
+                            const In<std::int64_t>& offsets, const In<double>& distances,
+                            const In<double>& spreads) {
+  require(points.ndim() == 2 && points.shape(1) >= 1 && points.shape(1) <= kMaxAxes,
+          "points: shape (N, D)");
+  require_finite(points);
+  const std::size_t n = points.shape(0), K = distances.ndim() == 2 ? distances.shape(0) : 0;
+  require(distances.size() == K * K && spreads.size() == K * K, "distances and spreads: shape (K, K)");
+  require(labels.size() == n, "labels: one for each point");
+  require_offsets(flat(offsets), n, "offsets: rising, within the points");
+  for (const std::int64_t k : flat(labels))
+    require(k >= -1 && k < static_cast<std::int64_t>(K), "labels: below K");
+  const std::vector<Point> at = to_points(points, static_cast<int>(points.shape(1)));
+  std::vector<std::int64_t> own(flat(labels).begin(), flat(labels).end());
+  {
+    nb::gil_scoped_release release;
+    LostMarkers lost(flat(distances), flat(spreads), K);
+    for (std::size_t t = 0; t + 1 < offsets.size(); ++t) {
+      const auto first = static_cast<std::size_t>(offsets.data()[t]);
+      const std::size_t size = static_cast<std::size_t>(offsets.data()[t + 1]) - first;
+      lost.find(std::span(at).subspan(first, size), std::span(own).subspan(first, size));
+    }
+  }
+  return array_of<std::int64_t>(own);
+}
+
 }  // namespace
 
 void bind_confidence(nb::module_& module) {
@@ -242,6 +270,8 @@ void bind_confidence(nb::module_& module) {
              "frames"_a, "offsets"_a, nb::kw_only(), "p_detection"_a, "n_threads"_a);
   module.def("exchange_ratios", &exchange_ratios, "motion"_a, "times"_a, "kind"_a, "F"_a, "Q"_a,
              "points"_a, "frames"_a, "offsets"_a, "cuts"_a, nb::kw_only(), "p_detection"_a);
+  module.def("find_lost", &find_lost, "points"_a, "labels"_a, "offsets"_a, "distances"_a,
+             "spreads"_a);
   nb::class_<Profiles>(module, "DistanceProfiles")
       .def(nb::init<const In<double>&, const In<std::int64_t>&, const In<std::int64_t>&,
                     const In<std::int64_t>&, std::int64_t, double>(),

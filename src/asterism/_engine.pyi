@@ -510,6 +510,15 @@ def exchanged_stretches(
     by_spreads: bool,
 ) -> tuple[Ints, Ints, Floats]: ...
 
+# Track of each detection, with those of tracks that had none in the frame.
+def find_lost(
+    points: Floats,
+    labels: Ints,
+    offsets: Ints,
+    distances: Floats,
+    spreads: Floats,
+) -> Ints: ...
+
 # `samples` are the frames from which the distances that each track keeps are learnt.
 class DistanceProfiles:
     def __init__(

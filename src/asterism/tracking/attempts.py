@@ -23,6 +23,7 @@ from asterism.tracking.confidence.identity import (
 from asterism.tracking.confidence.reassign import ghost_log_odds, reassigned
 from asterism.tracking.estimation import OVER_THREE_FRAMES, fit_body_motion, fit_to_tracks
 from asterism.tracking.lone import with_lone_detections
+from asterism.tracking.lost import with_lost_markers
 from asterism.tracking.methods import GNN, METHODS, TOMHT, Rigidity, method_by_name, options_of
 from asterism.tracking.methods.associate import associate
 from asterism.tracking.naming import learn_marker_set, name_tracks
@@ -192,8 +193,9 @@ def most_certain(
     with bonds must be more certain by `DOUBTFUL`, because it uses distances as the confidence does.
     Then further passes follow (`next_pass`), until one is not more certain, and an attempt with the
     motion in tracks of single frames. Every result is `refined_by_own_distances`. At the end all
-    detections of tracks with bonds are assigned once more, tracks take lone detections, and tracks
-    that have each other's marker are exchanged back (`exchanged_by_spreads`). For `progress`, the
+    detections of tracks with bonds are assigned once more, tracks take lone detections and those of
+    lost markers, and tracks that have each other's marker are exchanged back
+    (`exchanged_by_spreads`). For `progress`, the
     first method is half of the work, and every other attempt or pass half of what is left.
 
     Parameters
@@ -234,7 +236,8 @@ def most_certain(
         best = refined_by_own_distances(first)
     if progress is not None:
         progress(n)
-    return exchanged_by_spreads(_with_lone_detections(_reassigned(_with_reason(best, first))))
+    best = _with_lone_detections(_reassigned(_with_reason(best, first)))
+    return exchanged_by_spreads(_with_lost_markers(best))
 
 
 def _after_passes(best: Uncorrected, begin: Callable[[], Callable[[int], Any]]) -> Uncorrected:
@@ -282,6 +285,16 @@ def _with_lone_detections(found: Uncorrected) -> Uncorrected:
     return dataclasses.replace(found, tracks=tracks, stitching=stitching)
 
 
+def _with_lost_markers(found: Uncorrected) -> Uncorrected:
+    """Find markers by their distances where tracks have lost them, if identities are in doubt."""
+    tracks = found.tracks
+    if not found.is_doubtful:
+        return found
+    noise_sigma = found.model.sensor.noise_sigma
+    labels = with_lost_markers(tracks.detections, tracks.labels, noise_sigma)
+    return _with_labels(found, labels, int(tracks.info.get("refinements", 0)))
+
+
 def _with_reason(best: Uncorrected, first: Uncorrected) -> Uncorrected:
     """Return the best result with the reason for it, if a further attempt made it."""
     recipe, other = best.recipe, first.recipe
@@ -298,7 +311,7 @@ def _with_reason(best: Uncorrected, first: Uncorrected) -> Uncorrected:
 
 
 def _reassigned(found: Uncorrected) -> Uncorrected:
-    """Assign all detections once more, while that makes more identities certain.
+    """Assign all detections once more and find lost markers, while that makes more certain.
 
     The confidence uses the same distances, so that it is too high afterwards to compare the result
     with another attempt.
@@ -307,11 +320,12 @@ def _reassigned(found: Uncorrected) -> Uncorrected:
     for _ in range(MAX_ROUNDS):
         if not best.is_doubtful:
             break
-        tracks = best.tracks
+        tracks, noise_sigma = best.tracks, best.model.sensor.noise_sigma
         labels = reassigned(
             tracks, np.ones(len(tracks.labels), dtype=bool), ghost_log_odds(tracks, best.stitching),
-            best.model.sensor.noise_sigma,
+            noise_sigma,
         )  # fmt: skip
+        labels = with_lost_markers(tracks.detections, labels, noise_sigma)
         again = _with_labels(best, labels, int(tracks.info.get("refinements", 0)) + 1)
         if again.expected_right <= best.expected_right:
             break
