@@ -41,7 +41,7 @@ class LostMarkers {
       if (labels[i] < 0) free_.push_back(i); else at_[labels[i]] = &points[i];
     lost_.clear();
     for (std::size_t k = 0; k < K_ && !free_.empty(); ++k)
-      if (at_[k] == nullptr && bonds_[k].size() >= kMinBonds) lost_.push_back(static_cast<std::int32_t>(k));
+      if (at_[k] == nullptr && !bonds_[k].empty()) lost_.push_back(static_cast<std::int32_t>(k));
     odds_.assign(lost_.size() * free_.size(), kNone);
     for (std::size_t a = 0; a < lost_.size(); ++a) compare(a, points);
     while (const Pair clear = clearest()) {
@@ -59,7 +59,7 @@ class LostMarkers {
   }
 
  private:
-  static constexpr std::size_t kBonds = 5, kMinBonds = 2, kFree = 4;
+  static constexpr std::size_t kBonds = 5, kFree = 4;
   static constexpr double kUnknown = 1.0 / 3;  // spread about a distance, as a share of it
   static constexpr double kEnough = 6, kLead = 3;  // nats; kEnough as for a body that returns
   static constexpr double kNone = -std::numeric_limits<double>::infinity();
@@ -79,7 +79,7 @@ class LostMarkers {
     used_.clear();
     for (const std::int32_t j : bonds_[k])
       if (at_[j] != nullptr && used_.size() < kBonds) used_.push_back(j);
-    if (used_.size() < kMinBonds) return;
+    if (used_.empty()) return;
     const auto n = static_cast<double>(std::min(used_.size(), kFree));
     for (std::size_t u = 0; u < free_.size(); ++u) {
       double sum = 0;

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-BONDS, MIN_BONDS, FREE = 5, 2, 4
+BONDS, FREE = 5, 4
 UNKNOWN, ENOUGH, LEAD = 1 / 3, 6.0, 3.0
 
 
@@ -24,7 +24,7 @@ def log_odds(points: Array, at: Array, distances: Array, spreads: Array) -> Arra
     """Return the log odds of points (n, D) being of a track, by its distances to others (K, D)."""
     used = np.argsort(spreads, kind="stable")
     used = used[np.isfinite(spreads[used]) & np.isfinite(at[used]).all(axis=1)][:BONDS]
-    if len(used) < MIN_BONDS:
+    if not len(used):
         return np.full(len(points), -np.inf)
     d, s = distances[used], spreads[used]
     off = np.linalg.norm(points[:, None] - at[used], axis=2) - d

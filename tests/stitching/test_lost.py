@@ -59,31 +59,29 @@ def test_nothing_is_found_without_tracks_or_detections():
 
 
 def test_the_engine_finds_what_the_reference_finds():
-    """Bodies of random markers with random bonds, some lost, among clutter and near ghosts."""
+    """Bodies of random markers with random bonds, some lost, among clutter, ghosts and twins."""
     rng = np.random.default_rng(5)
     n_found = 0
     for _ in range(400):
-        n = int(rng.integers(3, 9))
+        n = int(rng.integers(3, 13))
         body = rng.uniform(-0.3, 0.3, (n, 3))
+        if rng.random() < 0.5:  # two tracks of nearly the same distances
+            body[1] = body[0] + rng.normal(0, 0.003, 3)
         distances = np.linalg.norm(body[:, None] - body, axis=2)
-        spreads = rng.choice([0.002, 0.005, 0.02], (n, n))
+        distances += np.triu(rng.normal(0, 0.003, (n, n)), 1)
+        spreads = rng.uniform(0.002, 0.02, (n, n))
         spreads[rng.random((n, n)) < 0.2] = np.inf
-        spreads = np.maximum(spreads, spreads.T)
         np.fill_diagonal(spreads, np.inf)
         seen = np.flatnonzero(rng.random(n) < 0.9)
-        near = body[rng.choice(n, 2)] + rng.normal(0, 0.02, (2, 3))
-        points = np.concatenate(
-            [
-                body[seen] + rng.normal(0, 0.002, (len(seen), 3)),
-                near,
-                rng.uniform(-0.5, 0.5, (3, 3)),
-            ]
-        )
+        near = body[rng.choice(n, 2)] + rng.normal(0, 0.01, (2, 3))
+        clutter = rng.uniform(-0.5, 0.5, (3, 3))
+        points = np.concatenate([body[seen] + rng.normal(0, 0.003, (len(seen), 3)), near, clutter])
         labels = np.concatenate([np.where(rng.random(len(seen)) < 0.5, seen, -1), np.full(5, -1)])
         order = rng.permutation(len(points))
         points, labels = points[order], labels[order]
         expected = found_in_frame(points, labels, distances, spreads)
-        found = _engine.find_lost(points, labels, np.array([0, len(points)]), distances, spreads)
+        offsets = np.array([0, len(points)])
+        found = _engine.find_lost(points, labels, offsets, distances, spreads)
         np.testing.assert_array_equal(found, expected)
         n_found += int((found != labels).sum())
-    assert n_found > 150
+    assert n_found > 400
