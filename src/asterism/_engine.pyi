@@ -141,9 +141,15 @@ class LifeOptions:
 # What all trackers have; there is no such class in the module.
 class _Tracker:
     # (labels, confidence, earlier detections whose label changes, their labels, their confidence,
-    # counts); a confidence is None if the tracker provides none
+    # counts); a confidence is None if the tracker provides none. With a stitcher, which is changed
+    # too, labels are markers.
     def step(
-        self, time: float, F: Floats, Q: Floats, points: Floats
+        self,
+        time: float,
+        F: Floats,
+        Q: Floats,
+        points: Floats,
+        stitcher: LiveStitcher | None = None,
     ) -> tuple[Ints, Floats | None, Ints, Ints, Floats | None, FrameStats]: ...
     def run(
         self,
@@ -157,8 +163,11 @@ class _Tracker:
         confidence: Floats,
     ) -> None: ...
     def copy(self) -> Self: ...
-    # (ids, frames since the last detection, log odds, means, covariances) of the confirmed tracks
-    def tracks(self) -> tuple[Ints, Ints, Floats, Floats, Floats]: ...
+    # (ids, frames since the last detection, log odds, means, covariances) of the confirmed tracks, or
+    # of the markers of a stitcher
+    def tracks(
+        self, stitcher: LiveStitcher | None = None
+    ) -> tuple[Ints, Ints, Floats, Floats, Floats]: ...
     has_confidence: Final[bool]
     n_frames: Final[int]
     n_seen: Final[int]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from dataclasses import replace
 from functools import partial
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -189,22 +190,47 @@ class EngineMethod(Method[EngineState]):
         SolverLimit
             If a gate contains too many detections for the memory.
         """
+        return self.step_stitched(state, None, time, points, covariances)
+
+    def step_stitched(
+        self,
+        state: EngineState,
+        stitcher: _engine.LiveStitcher | None,
+        time: float,
+        points: ArrayLike,
+        covariances: ArrayLike | None,
+    ) -> tuple[EngineState, Update]:
+        """Process the next frame as `step` does, and stitch its tracklets in the same call.
+
+        Parameters
+        ----------
+        state, time, points, covariances
+            As for `Method.step`.
+        stitcher : LiveStitcher, optional
+            Markers before the frame; it is changed. The update is that of the markers.
+
+        Returns
+        -------
+        state, update
+            As for `Method.step`.
+        """
         from asterism import _engine
         from asterism.model.compiled import no_transition, transition, with_noise
 
         check_kind("state", state, EngineState, "method.init(model)")
         tracker = state.tracker.copy()
         self._check(state, time, points)
-        frame = checked_frame(time, tracker.last_time, points, state.n_axes)
+        last_time = tracker.last_time
+        frame = checked_frame(time, last_time, points, state.n_axes)
         if covariances is not None:
             frame = with_noise(frame, checked_covariances(covariances, frame))
-        # The first frame has no step before it and no tracks, so no transition is needed.
-        dt = time - tracker.last_time if tracker.n_frames else None
         motion = state.model.motion
-        F, Q = transition(motion, dt) if dt else no_transition(motion)
+        # The first frame has no step before it and no tracks, so no transition is needed.
+        is_first = last_time == -inf
+        F, Q = no_transition(motion) if is_first else transition(motion, time - last_time)
         try:
             labels, sure, revised, revised_labels, revised_sure, stats = tracker.step(
-                time, F, Q, frame
+                time, F, Q, frame, stitcher
             )
         except (_engine.CandidateLimit, _engine.FrontierLimit) as error:
             raise _too_many(error) from error
@@ -214,7 +240,7 @@ class EngineMethod(Method[EngineState]):
         return after, Update(
             labels=labels, revised=revised, revised_labels=revised_labels, confidence=sure,
             revised_confidence=revised_sure, info=self._about(stats),
-            read_tracks=partial(_tracks_of, tracker),
+            read_tracks=partial(_tracks_of, tracker, stitcher),
         )  # fmt: skip
 
     def _check(self, state: EngineState, time: float, points: ArrayLike) -> None:
@@ -270,8 +296,8 @@ class EngineMethod(Method[EngineState]):
         return replace(state, tracker=tracker), labels[first:], confidence
 
 
-def _tracks_of(tracker: Tracker) -> TrackStates:
-    return states_of(*tracker.tracks())
+def _tracks_of(tracker: Tracker, stitcher: _engine.LiveStitcher | None) -> TrackStates:
+    return states_of(*tracker.tracks(stitcher))
 
 
 def _too_many(error: Exception) -> SolverLimit:

@@ -15,6 +15,7 @@ from asterism.model.compiled import motion_model, no_transition, transition
 from asterism.records import record
 from asterism.tracking.methods import SMP, Method, TrackStates, Update
 from asterism.tracking.methods.base import MethodState, checked_frame
+from asterism.tracking.methods.engine_method import EngineMethod, EngineState
 from asterism.tracking.methods.states import states_of
 from asterism.tracking.stitching.tracklets import tracklet_model
 from asterism.tracking.stitching.whole import check_options, stitch_options
@@ -188,22 +189,30 @@ class Stitched(Method[StitchedState]):
             Next state, and the labels of markers that the frame decides or revises.
         """
         check_kind("state", state, StitchedState, "method.init(model)")
-        frame = checked_frame(time, state.last_time, points, state.n_axes)
-        tracklets, found = self.method.step(state.tracklets, time, frame, covariances=covariances)
-        motion, dt = state.model.motion, time - state.last_time
-        F, Q = no_transition(motion) if dt == float("inf") else transition(motion, dt)
         stitcher = state.stitcher.copy()
-        labels, revised, revised_labels = stitcher.step(
-            F, Q, frame, found.labels, found.revised, found.revised_labels
-        )
+        if isinstance(self.method, EngineMethod) and isinstance(state.tracklets, EngineState):
+            tracklets, update = self.method.step_stitched(
+                state.tracklets, stitcher, time, points, covariances
+            )
+        else:
+            frame = checked_frame(time, state.last_time, points, state.n_axes)
+            tracklets, found = self.method.step(
+                state.tracklets, time, frame, covariances=covariances
+            )
+            motion, dt = state.model.motion, time - state.last_time
+            F, Q = no_transition(motion) if dt == float("inf") else transition(motion, dt)
+            labels, revised, revised_labels = stitcher.step(
+                F, Q, frame, found.labels, found.revised, found.revised_labels
+            )
+            update = Update(
+                labels=labels, revised=revised, revised_labels=revised_labels, info=found.info,
+                read_tracks=partial(_tracks_of, stitcher, found),
+            )  # fmt: skip
         after = StitchedState(
             tracklets=tracklets, stitcher=stitcher, model=state.model, n_axes=state.n_axes,
             last_time=time,
         )  # fmt: skip
-        return after, Update(
-            labels=labels, revised=revised, revised_labels=revised_labels, info=found.info,
-            read_tracks=partial(_tracks_of, stitcher, found),
-        )  # fmt: skip
+        return after, update
 
 
 def _tracks_of(stitcher: _engine.LiveStitcher, found: Update) -> TrackStates | None:
