@@ -163,8 +163,8 @@ class _Tracker:
         confidence: Floats,
     ) -> None: ...
     def copy(self) -> Self: ...
-    # (ids, frames since the last detection, log odds, means, covariances) of the confirmed tracks, or
-    # of the markers of a stitcher
+    # (ids, frames since the last detection, log odds, means, covariances) of the confirmed tracks,
+    # or of the markers of a stitcher
     def tracks(
         self, stitcher: LiveStitcher | None = None
     ) -> tuple[Ints, Ints, Floats, Floats, Floats]: ...

@@ -5,7 +5,6 @@ from __future__ import annotations
 import gc
 import logging
 import math
-import threading
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -24,6 +23,7 @@ from asterism.live.sinks.page import PageSink
 from asterism.live.sources.base import EndOfSource
 
 if TYPE_CHECKING:
+    import threading
     from collections.abc import Callable, Sequence
 
     from asterism.live.estimation import Estimator
@@ -161,6 +161,7 @@ class LiveLoop:
             if receiver.collect():
                 continue
             # The next frame is a few milliseconds away: this is the time for everything else.
+            tracker.prepare()
             if now >= next_status:
                 next_status = now + STATUS
                 self._report(status)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import field, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -42,6 +42,8 @@ class StitchedState:
         Number of coordinates, 2 or 3.
     last_time : float
         Time of the last frame, seconds; -inf before the first.
+    prepared : list of LiveStitcher
+        A copy of the stitcher for the next step, if one was made in advance.
 
     Examples
     --------
@@ -60,6 +62,7 @@ class StitchedState:
     model: TrackingModel
     n_axes: int
     last_time: float = float("-inf")
+    prepared: list[_engine.LiveStitcher] = field(default_factory=list[_engine.LiveStitcher])
 
     def __repr__(self) -> str:
         stitcher = self.stitcher
@@ -189,16 +192,13 @@ class Stitched(Method[StitchedState]):
             Next state, and the labels of markers that the frame decides or revises.
         """
         check_kind("state", state, StitchedState, "method.init(model)")
-        stitcher = state.stitcher.copy()
-        if isinstance(self.method, EngineMethod) and isinstance(state.tracklets, EngineState):
-            tracklets, update = self.method.step_stitched(
-                state.tracklets, stitcher, time, points, covariances
-            )
+        stitcher = state.prepared.pop() if state.prepared else state.stitcher.copy()
+        tracklets, method = state.tracklets, self._engine_method
+        if method is not None and isinstance(tracklets, EngineState):
+            tracklets, update = method.step_stitched(tracklets, stitcher, time, points, covariances)
         else:
             frame = checked_frame(time, state.last_time, points, state.n_axes)
-            tracklets, found = self.method.step(
-                state.tracklets, time, frame, covariances=covariances
-            )
+            tracklets, found = self.method.step(tracklets, time, frame, covariances=covariances)
             motion, dt = state.model.motion, time - state.last_time
             F, Q = no_transition(motion) if dt == float("inf") else transition(motion, dt)
             labels, revised, revised_labels = stitcher.step(
@@ -210,9 +210,20 @@ class Stitched(Method[StitchedState]):
             )  # fmt: skip
         after = StitchedState(
             tracklets=tracklets, stitcher=stitcher, model=state.model, n_axes=state.n_axes,
-            last_time=time,
+            last_time=time, prepared=[],
         )  # fmt: skip
         return after, update
+
+    @cached_property
+    def _engine_method(self) -> EngineMethod | None:
+        """The method, if it tracks and stitches in one call; None otherwise."""
+        return self.method if isinstance(self.method, EngineMethod) else None
+
+    def prepare(self, state: StitchedState) -> None:
+        """Copy the stitcher for the next step, and prepare its method; see `Method.prepare`."""
+        if not state.prepared:
+            state.prepared.append(state.stitcher.copy())
+        self.method.prepare(state.tracklets)
 
 
 def _tracks_of(stitcher: _engine.LiveStitcher, found: Update) -> TrackStates | None:
