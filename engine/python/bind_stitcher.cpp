@@ -78,7 +78,7 @@ nb::tuple step_stitcher(LiveStitcher& stitcher, const In<double>& F, const In<do
   }
   {
     nb::gil_scoped_release release;
-    stitch(stitcher, step, frame, now, changes);
+    stitch(stitcher, stitcher, step, frame, now, changes);
   }
   return nb::make_tuple(array_of<std::int64_t>(now, &Decided::id),
                         array_of<std::int64_t>(changes, &Decided::detection),
@@ -255,13 +255,15 @@ nb::tuple judge_distances(const In<double>& means, const In<double>& variances,
 
 }  // namespace
 
-void asterism::stitch(LiveStitcher& stitcher, const MotionStep& step, std::span<const Point> frame,
-                      std::vector<Decided>& now, std::vector<Decided>& revised) {
+void asterism::stitch(LiveStitcher& stitcher, const LiveStitcher& before, const MotionStep& step,
+                      std::span<const Point> frame, std::vector<Decided>& now,
+                      std::vector<Decided>& revised) {
   std::vector<std::int64_t> labels;
   for (const Decided& one : now) labels.push_back(one.id);
   std::vector<std::pair<std::int64_t, std::int64_t>> changes;
   for (const Decided& one : revised) changes.emplace_back(one.detection, one.id);
   revised.clear();
+  if (stitcher.contradicts(changes)) stitcher = before;
   const std::int64_t first = stitcher.n_seen();
   stitcher.step(step, frame, labels, changes, [&](std::int64_t detection, std::int64_t marker) {
     if (detection < first)
@@ -362,6 +364,7 @@ void bind_stitcher(nb::module_& module) {
       .def("step", &step_stitcher, "F"_a, "Q"_a, "points"_a, "labels"_a, "revised"_a,
            "revised_labels"_a)
       .def("copy", [](const LiveStitcher& self) { return LiveStitcher(self); })
+      .def("look_ahead", &LiveStitcher::look_ahead)
       .def("states", &states_of_markers, "labels"_a, "gaps"_a, "log_odds"_a, "means"_a,
            "covariances"_a)
       .def_prop_ro("n_seen", &LiveStitcher::n_seen)

@@ -17,9 +17,10 @@ struct Decided {
 };
 
 // Replaces a tracker's decisions on a frame, `now`, and on earlier detections, `revised`, by those
-// of the stitcher.
-void stitch(LiveStitcher& stitcher, const MotionStep& step, std::span<const Point> frame,
-            std::vector<Decided>& now, std::vector<Decided>& revised);
+// of the stitcher. If it has looked ahead and these contradict, it starts from `before`.
+void stitch(LiveStitcher& stitcher, const LiveStitcher& before, const MotionStep& step,
+            std::span<const Point> frame, std::vector<Decided>& now,
+            std::vector<Decided>& revised);
 
 // A track after a frame.
 struct TrackNow {

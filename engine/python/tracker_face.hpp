@@ -43,15 +43,18 @@ Labeller labeller(const Tracker& tracker, Labels labels, Confidence confidence, 
 
 // Processes a frame and returns its decisions: labels and confidence, earlier detections whose label
 // changes with their labels and confidence, and counts. A confidence that the tracker does not provide
-// is None. With a stitcher, labels are markers, which have no confidence.
+// is None. With a stitcher, labels are markers, which have no confidence; `before` is the stitcher that
+// it is a copy of.
 template <typename Tracker>
 nb::tuple step(Tracker& tracker, double time, const In<double>& F, const In<double>& Q,
-               const In<double>& points, LiveStitcher* stitcher) {
+               const In<double>& points, LiveStitcher* stitcher, const LiveStitcher* before) {
   std::vector<Point> frame = to_points(points, tracker.motion().axis.D);
   const MotionStep motion = motion_step(tracker.motion(), F, Q);
   std::vector<Decided> now(frame.size()), revised;
   const std::int64_t first = tracker.so_far().n_seen;
-  require(stitcher == nullptr || stitcher->n_seen() == first, "stitcher: of the same detections");
+  require(stitcher == nullptr || (stitcher->n_seen() == first && before != nullptr &&
+                                  before->n_seen() == first),
+          "stitcher and before: of the same detections");
   const Labeller label = [&](std::int64_t detection, std::int64_t id, double p) {
     if (detection < first)
       revised.push_back({detection, id, p});
@@ -64,7 +67,7 @@ nb::tuple step(Tracker& tracker, double time, const In<double>& F, const In<doub
     stats = tracker.step(time, motion, frame, label);
     if (stitcher != nullptr) {
       for (Point& y : frame) y.r = 0;  // the stitcher knows no noise but the sensor's
-      stitch(*stitcher, motion, frame, now, revised);
+      stitch(*stitcher, *before, motion, frame, now, revised);
     }
   }
   const auto ids = [](const auto& all) { return nb::cast(array_of<std::int64_t>(all, &Decided::id)); };
@@ -133,7 +136,7 @@ template <typename Tracker>
 nb::class_<Tracker> bind_tracker(nb::module_& module, const char* name) {
   return nb::class_<Tracker>(module, name)
       .def("step", &step<Tracker>, "time"_a, "F"_a, "Q"_a, "points"_a,
-           "stitcher"_a.none() = nb::none())
+           "stitcher"_a.none() = nb::none(), "before"_a.none() = nb::none())
       .def("run", &run<Tracker>, "times"_a, "kind"_a, "F"_a, "Q"_a, "offsets"_a, "points"_a,
            "labels"_a.noconvert(), "confidence"_a.noconvert())
       .def("copy", [](const Tracker& self) { return Tracker(self); })

@@ -142,7 +142,7 @@ class LifeOptions:
 class _Tracker:
     # (labels, confidence, earlier detections whose label changes, their labels, their confidence,
     # counts); a confidence is None if the tracker provides none. With a stitcher, which is changed
-    # too, labels are markers.
+    # too, labels are markers; `before` is the stitcher that it is a copy of.
     def step(
         self,
         time: float,
@@ -150,6 +150,7 @@ class _Tracker:
         Q: Floats,
         points: Floats,
         stitcher: LiveStitcher | None = None,
+        before: LiveStitcher | None = None,
     ) -> tuple[Ints, Floats | None, Ints, Ints, Floats | None, FrameStats]: ...
     def run(
         self,
@@ -616,6 +617,8 @@ class LiveStitcher:
         revised_labels: Ints,
     ) -> tuple[Ints, Ints, Ints]: ...
     def copy(self) -> LiveStitcher: ...
+    # Does the part of the next step that seldom depends on its frame.
+    def look_ahead(self) -> None: ...
     # As `tracks` of a tracker, of the markers, from that of the tracker of the labels.
     def states(
         self, labels: Ints, gaps: Ints, log_odds: Floats, means: Floats, covariances: Floats

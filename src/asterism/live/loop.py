@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from asterism.live.sinks.base import Sink
     from asterism.live.sources.base import Source
     from asterism.model import MarkerSet, TrackingModel
-    from asterism.tracking.methods import Method, Update
+    from asterism.tracking.methods import Method
 
 __all__ = ["LiveLoop"]
 
@@ -83,7 +83,7 @@ class LiveLoop:
         self._first_time: float | None = None
         self._elapsed = 0.0  # seconds of the stream
         self._n_frames = 0
-        self._last: Update | None = None
+        self._last: LiveFrame | None = None
         self._last_arrival = math.inf
         self._is_silent = False
 
@@ -183,15 +183,15 @@ class LiveLoop:
         if self._first_time is None:
             self._first_time = frame.time
         self._elapsed = frame.time - self._first_time
-        self._last = update = self._tracker.step(accepted, period)
-        done = LiveFrame(
+        update = self._tracker.step(accepted, period)
+        self._last = last = LiveFrame(
             number=frame.number, time=frame.time, points=frame.points, labels=update.labels,
-            names=update.names, read_tracks=lambda: update.tracks, received=frame.received,
+            names=update.names, read_tracks=update.read_tracks, received=frame.received,
             done=perf_counter(),
         )  # fmt: skip
         for sink in tuple(self._sinks):
             try:
-                sink.send(done)
+                sink.send(last)
             except (AsterismError, OSError) as error:
                 self._faults.add("sinks", f"{sink.name} fails and is left out ({error})")
                 self._sinks.remove(sink)

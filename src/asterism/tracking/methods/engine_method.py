@@ -192,12 +192,13 @@ class EngineMethod(Method[EngineState]):
         SolverLimit
             If a gate contains too many detections for the memory.
         """
-        return self.step_stitched(state, None, time, points, covariances)
+        return self.step_stitched(state, None, None, time, points, covariances)
 
     def step_stitched(
         self,
         state: EngineState,
         stitcher: _engine.LiveStitcher | None,
+        before: _engine.LiveStitcher | None,
         time: float,
         points: ArrayLike,
         covariances: ArrayLike | None,
@@ -209,7 +210,10 @@ class EngineMethod(Method[EngineState]):
         state, time, points, covariances
             As for `Method.step`.
         stitcher : LiveStitcher, optional
-            Markers before the frame; it is changed. The update is that of the markers.
+            Copy of `before` that is changed; it may have looked ahead. The update is that of the
+            markers.
+        before : LiveStitcher, optional
+            Markers before the frame.
 
         Returns
         -------
@@ -229,7 +233,7 @@ class EngineMethod(Method[EngineState]):
         F, Q = no_transition(motion) if is_first else transition(motion, time - last_time)
         try:
             labels, sure, revised, revised_labels, revised_sure, stats = tracker.step(
-                time, F, Q, frame, stitcher
+                time, F, Q, frame, stitcher, before
             )
         except (_engine.CandidateLimit, _engine.FrontierLimit) as error:
             raise _too_many(error) from error

@@ -43,7 +43,7 @@ class StitchedState:
     last_time : float
         Time of the last frame, seconds; -inf before the first.
     prepared : list of LiveStitcher
-        A copy of the stitcher for the next step, if one was made in advance.
+        A copy of the stitcher for the next step that has looked ahead, if one was made.
 
     Examples
     --------
@@ -192,11 +192,14 @@ class Stitched(Method[StitchedState]):
             Next state, and the labels of markers that the frame decides or revises.
         """
         check_kind("state", state, StitchedState, "method.init(model)")
-        stitcher = state.prepared.pop() if state.prepared else state.stitcher.copy()
         tracklets, method = state.tracklets, self._engine_method
         if method is not None and isinstance(tracklets, EngineState):
-            tracklets, update = method.step_stitched(tracklets, stitcher, time, points, covariances)
+            stitcher = state.prepared.pop() if state.prepared else state.stitcher.copy()
+            tracklets, update = method.step_stitched(
+                tracklets, stitcher, state.stitcher, time, points, covariances
+            )
         else:
+            stitcher = state.stitcher.copy()
             frame = checked_frame(time, state.last_time, points, state.n_axes)
             tracklets, found = self.method.step(tracklets, time, frame, covariances=covariances)
             motion, dt = state.model.motion, time - state.last_time
@@ -220,9 +223,15 @@ class Stitched(Method[StitchedState]):
         return self.method if isinstance(self.method, EngineMethod) else None
 
     def prepare(self, state: StitchedState) -> None:
-        """Copy the stitcher for the next step, and prepare its method; see `Method.prepare`."""
-        if not state.prepared:
-            state.prepared.append(state.stitcher.copy())
+        """Do most of the next step's stitching, and prepare its method; see `Method.prepare`.
+
+        The frame that waits longest is stitched on a copy. If the method revises it in the next
+        step, that copy is not used.
+        """
+        if self._engine_method is not None and not state.prepared:
+            ahead = state.stitcher.copy()
+            ahead.look_ahead()
+            state.prepared.append(ahead)
         self.method.prepare(state.tracklets)
 
 
