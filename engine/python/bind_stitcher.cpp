@@ -10,9 +10,9 @@
 #include "python/arrays.hpp"
 #include "python/bindings.hpp"
 #include "python/motion_arrays.hpp"
+#include "python/stitched.hpp"
 #include "rigid/joint_places.hpp"
 #include "stitch/distance_exchanges.hpp"
-#include "stitch/live_stitcher.hpp"
 
 using namespace nb::literals;
 using namespace asterism;
@@ -69,62 +69,40 @@ nb::tuple step_stitcher(LiveStitcher& stitcher, const In<double>& F, const In<do
   require(revised.ndim() == 1 && revised_labels.ndim() == 1 &&
               revised.size() == revised_labels.size(),
           "revised_labels: one for each of revised");
-  using Change = std::pair<std::int64_t, std::int64_t>;
-  std::vector<Change> changes(revised.size()), reported;
+  std::vector<Decided> now(frame.size()), changes(revised.size());
+  for (std::size_t i = 0; i < now.size(); ++i) now[i].id = labels.data()[i];
   for (std::size_t i = 0; i < changes.size(); ++i) {
     changes[i] = {revised.data()[i], revised_labels.data()[i]};
-    require(changes[i].first >= 0 && changes[i].first < stitcher.n_seen(),
+    require(changes[i].detection >= 0 && changes[i].detection < stitcher.n_seen(),
             "revised: detections of earlier frames");
   }
-  std::vector<std::int64_t> own(frame.size());
   {
     nb::gil_scoped_release release;
-    const std::int64_t first = stitcher.n_seen();
-    stitcher.step(step, frame, flat(labels), changes, [&](std::int64_t detection, std::int64_t marker) {
-      if (detection < first)
-        reported.emplace_back(detection, marker);
-      else
-        own[detection - first] = marker;
-    });
+    stitch(stitcher, stitcher, step, frame, now, changes);
   }
-  return nb::make_tuple(array_of<std::int64_t>(own),
-                        array_of<std::int64_t>(reported, &Change::first),
-                        array_of<std::int64_t>(reported, &Change::second));
+  return nb::make_tuple(array_of<std::int64_t>(now, &Decided::id),
+                        array_of<std::int64_t>(changes, &Decided::detection),
+                        array_of<std::int64_t>(changes, &Decided::id));
 }
 
-// Returns the states of the markers (see TrackArrays): those of the tracklets with these labels, and
-// of the markers without one, whose log odds are unknown.
-nb::tuple marker_states(LiveStitcher& self, const In<std::int64_t>& labels,
-                        const In<std::int64_t>& gaps, const In<double>& log_odds,
-                        const In<double>& means, const In<double>& covariances) {
-  const MotionModel& m = self.motion();
-  const std::size_t K = labels.size(), D = m.axis.D, n = m.axis.n;
+// The states of the markers, from those of the tracklets.
+nb::tuple states_of_markers(LiveStitcher& self, const In<std::int64_t>& labels,
+                            const In<std::int64_t>& gaps, const In<double>& log_odds,
+                            const In<double>& means, const In<double>& covariances) {
+  const std::size_t K = labels.size(), D = self.motion().axis.D, n = self.motion().axis.n;
   require(labels.ndim() == 1 && gaps.size() == K && log_odds.size() == K,
           "gaps and log_odds: one for each label");
   require(means.size() == K * D * n && covariances.size() == K * n * n,
           "means and covariances: shape (K, D, n) and (K, n, n)");
-  const std::vector<std::int32_t> markers = self.markers_of(flat(labels));
-  Places present;
-  std::vector<std::int32_t> known;
+  std::vector<TrackNow> tracklets(K);
   for (std::size_t k = 0; k < K; ++k) {
-    if (markers[k] < 0) continue;
-    known.push_back(markers[k]);
-    if (gaps.data()[k] > 0) continue;
     AxisState state;
     for (std::size_t d = 0; d < D; ++d)
       std::copy_n(means.data() + (k * D + d) * n, n, state.x[d].begin());
-    present.set(markers[k], observed(m.axis, state));
+    std::copy_n(covariances.data() + k * n * n, n * n, state.P.begin());
+    tracklets[k] = {labels.data()[k], gaps.data()[k], log_odds.data()[k], state};
   }
-  std::sort(known.begin(), known.end());
-  const std::vector<LiveStitcher::UnseenMarker> unseen = self.unseen(present, known);
-  TrackArrays out(m, known.size() + unseen.size());
-  for (std::size_t k = 0; k < K; ++k)
-    if (markers[k] >= 0)
-      out.add(markers[k], gaps.data()[k], log_odds.data()[k], means.data() + k * D * n,
-              covariances.data() + k * n * n);
-  for (const LiveStitcher::UnseenMarker& one : unseen)
-    out.add(one.marker, one.gap, std::numeric_limits<double>::quiet_NaN(), one.state);
-  return out.give();
+  return marker_states(self, tracklets);
 }
 
 // Returns the stretches in which tracks have each other's marker, of all pairs with a track that
@@ -277,6 +255,47 @@ nb::tuple judge_distances(const In<double>& means, const In<double>& variances,
 
 }  // namespace
 
+void asterism::stitch(LiveStitcher& stitcher, const LiveStitcher& before, const MotionStep& step,
+                      std::span<const Point> frame, std::vector<Decided>& now,
+                      std::vector<Decided>& revised) {
+  std::vector<std::int64_t> labels;
+  for (const Decided& one : now) labels.push_back(one.id);
+  std::vector<std::pair<std::int64_t, std::int64_t>> changes;
+  for (const Decided& one : revised) changes.emplace_back(one.detection, one.id);
+  revised.clear();
+  if (stitcher.contradicts(changes)) stitcher = before;
+  const std::int64_t first = stitcher.n_seen();
+  stitcher.step(step, frame, labels, changes, [&](std::int64_t detection, std::int64_t marker) {
+    if (detection < first)
+      revised.push_back({detection, marker});
+    else
+      now[detection - first].id = marker;
+  });
+}
+
+nb::tuple asterism::marker_states(LiveStitcher& stitcher, std::span<const TrackNow> tracklets) {
+  const MotionModel& m = stitcher.motion();
+  std::vector<std::int64_t> labels;
+  for (const TrackNow& one : tracklets) labels.push_back(one.id);
+  const std::vector<std::int32_t> markers = stitcher.markers_of(labels);
+  Places present;
+  std::vector<std::int32_t> known;
+  for (std::size_t k = 0; k < tracklets.size(); ++k) {
+    if (markers[k] < 0) continue;
+    known.push_back(markers[k]);
+    if (tracklets[k].gap == 0) present.set(markers[k], observed(m.axis, tracklets[k].state));
+  }
+  std::sort(known.begin(), known.end());
+  const std::vector<LiveStitcher::UnseenMarker> unseen = stitcher.unseen(present, known);
+  TrackArrays out(m, known.size() + unseen.size());
+  for (std::size_t k = 0; k < tracklets.size(); ++k)
+    if (markers[k] >= 0)
+      out.add(markers[k], tracklets[k].gap, tracklets[k].log_odds, tracklets[k].state);
+  for (const LiveStitcher::UnseenMarker& one : unseen)
+    out.add(one.marker, one.gap, std::numeric_limits<double>::quiet_NaN(), one.state);
+  return out.give();
+}
+
 void bind_stitcher(nb::module_& module) {
   module.attr("BEND") = kBend;
   module.attr("MIN_TOGETHER") = kMinTogether;
@@ -345,7 +364,8 @@ void bind_stitcher(nb::module_& module) {
       .def("step", &step_stitcher, "F"_a, "Q"_a, "points"_a, "labels"_a, "revised"_a,
            "revised_labels"_a)
       .def("copy", [](const LiveStitcher& self) { return LiveStitcher(self); })
-      .def("states", &marker_states, "labels"_a, "gaps"_a, "log_odds"_a, "means"_a,
+      .def("look_ahead", &LiveStitcher::look_ahead)
+      .def("states", &states_of_markers, "labels"_a, "gaps"_a, "log_odds"_a, "means"_a,
            "covariances"_a)
       .def_prop_ro("n_seen", &LiveStitcher::n_seen)
       .def_prop_ro("n_joins", &LiveStitcher::n_joins)

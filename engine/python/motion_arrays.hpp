@@ -123,13 +123,9 @@ class TrackArrays {
     for (std::size_t d = 0; d < D_; ++d)
       std::copy_n(state.x[d].begin(), n_, means() + (k_ * D_ + d) * n_);
     std::copy_n(state.P.begin(), n_ * n_, covariances() + k_ * n_ * n_);
-    add(id, gap, log_odds);
-  }
-  void add(std::int64_t id, std::int64_t gap, double log_odds, const double* mean,
-           const double* covariance) {
-    std::copy_n(mean, D_ * n_, means() + k_ * D_ * n_);
-    std::copy_n(covariance, n_ * n_, covariances() + k_ * n_ * n_);
-    add(id, gap, log_odds);
+    whole_.data[k_] = id;
+    whole_.data[K_ + k_] = gap;
+    real_.data[k_++] = log_odds;
   }
   // Returns (ids, gaps, log odds, means (K, D, n), covariances (K, n, n)).
   nb::tuple give() {
@@ -149,11 +145,6 @@ class TrackArrays {
  private:
   double* means() { return real_.data.get() + K_; }
   double* covariances() { return means() + K_ * D_ * n_; }
-  void add(std::int64_t id, std::int64_t gap, double log_odds) {
-    whole_.data[k_] = id;
-    whole_.data[K_ + k_] = gap;
-    real_.data[k_++] = log_odds;
-  }
 
   std::size_t D_, n_, K_, k_ = 0;
   Owned<std::int64_t> whole_;

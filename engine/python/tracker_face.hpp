@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "python/motion_arrays.hpp"
+#include "python/stitched.hpp"
 #include "rigid/carried_state.hpp"
 #include "tracks/live_tracks.hpp"
 
@@ -42,18 +43,18 @@ Labeller labeller(const Tracker& tracker, Labels labels, Confidence confidence, 
 
 // Processes a frame and returns its decisions: labels and confidence, earlier detections whose label
 // changes with their labels and confidence, and counts. A confidence that the tracker does not provide
-// is None.
+// is None. With a stitcher, labels are markers, which have no confidence; `before` is the stitcher that
+// it is a copy of.
 template <typename Tracker>
 nb::tuple step(Tracker& tracker, double time, const In<double>& F, const In<double>& Q,
-               const In<double>& points) {
-  const std::vector<Point> frame = to_points(points, tracker.motion().axis.D);
+               const In<double>& points, LiveStitcher* stitcher, const LiveStitcher* before) {
+  std::vector<Point> frame = to_points(points, tracker.motion().axis.D);
   const MotionStep motion = motion_step(tracker.motion(), F, Q);
-  struct Revision {
-    std::int64_t detection, id = -1;
-    double confidence = 0;
-  };
-  std::vector<Revision> now(frame.size()), revised;
+  std::vector<Decided> now(frame.size()), revised;
   const std::int64_t first = tracker.so_far().n_seen;
+  require(stitcher == nullptr || (stitcher->n_seen() == first && before != nullptr &&
+                                  before->n_seen() == first),
+          "stitcher and before: of the same detections");
   const Labeller label = [&](std::int64_t detection, std::int64_t id, double p) {
     if (detection < first)
       revised.push_back({detection, id, p});
@@ -64,14 +65,18 @@ nb::tuple step(Tracker& tracker, double time, const In<double>& F, const In<doub
   {
     nb::gil_scoped_release release;
     stats = tracker.step(time, motion, frame, label);
+    if (stitcher != nullptr) {
+      for (Point& y : frame) y.r = 0;  // the stitcher knows no noise but the sensor's
+      stitch(*stitcher, *before, motion, frame, now, revised);
+    }
   }
-  const auto ids = [](const auto& all) { return nb::cast(array_of<std::int64_t>(all, &Revision::id)); };
-  const auto sure = [&](const std::vector<Revision>& all) -> nb::object {
-    if (!tracker.has_confidence()) return nb::none();
-    return nb::cast(array_of<double>(all, &Revision::confidence));
+  const auto ids = [](const auto& all) { return nb::cast(array_of<std::int64_t>(all, &Decided::id)); };
+  const auto sure = [&](const std::vector<Decided>& all) -> nb::object {
+    if (stitcher != nullptr || !tracker.has_confidence()) return nb::none();
+    return nb::cast(array_of<double>(all, &Decided::confidence));
   };
   return nb::make_tuple(ids(now), sure(now),
-                        nb::cast(array_of<std::int64_t>(revised, &Revision::detection)),
+                        nb::cast(array_of<std::int64_t>(revised, &Decided::detection)),
                         ids(revised), sure(revised), std::move(stats));
 }
 
@@ -114,25 +119,28 @@ AxisState present_state(const MotionModel& m, const LiveTrack<More>& track) {
   return collapse(m, fused ? *fused : track.state);
 }
 
-// The states of the confirmed tracks (see TrackArrays).
+// The states of the confirmed tracks, or of the markers of a stitcher (see TrackArrays).
 template <typename Tracker>
-nb::tuple tracks(const Tracker& tracker) {
+nb::tuple tracks(const Tracker& tracker, LiveStitcher* stitcher) {
   const auto& live = tracker.live();
-  const auto tracks = confirmed(live);
-  TrackArrays out(tracker.motion(), tracks.size());
-  for (const auto* track : tracks)
-    out.add(track->id, track->gap, track->score, present_state(tracker.motion(), *track));
+  std::vector<TrackNow> found;
+  for (const auto* track : confirmed(live))
+    found.push_back({track->id, track->gap, track->score, present_state(tracker.motion(), *track)});
+  if (stitcher != nullptr) return marker_states(*stitcher, found);
+  TrackArrays out(tracker.motion(), found.size());
+  for (const TrackNow& one : found) out.add(one.id, one.gap, one.log_odds, one.state);
   return out.give();
 }
 
 template <typename Tracker>
 nb::class_<Tracker> bind_tracker(nb::module_& module, const char* name) {
   return nb::class_<Tracker>(module, name)
-      .def("step", &step<Tracker>, "time"_a, "F"_a, "Q"_a, "points"_a)
+      .def("step", &step<Tracker>, "time"_a, "F"_a, "Q"_a, "points"_a,
+           "stitcher"_a.none() = nb::none(), "before"_a.none() = nb::none())
       .def("run", &run<Tracker>, "times"_a, "kind"_a, "F"_a, "Q"_a, "offsets"_a, "points"_a,
            "labels"_a.noconvert(), "confidence"_a.noconvert())
       .def("copy", [](const Tracker& self) { return Tracker(self); })
-      .def("tracks", &tracks<Tracker>)
+      .def("tracks", &tracks<Tracker>, "stitcher"_a.none() = nb::none())
       .def_prop_ro("has_confidence", &Tracker::has_confidence)
       .def_prop_ro("n_frames", [](const Tracker& self) { return self.so_far().n_frames; })
       .def_prop_ro("n_seen", [](const Tracker& self) { return self.so_far().n_seen; })

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cassert>
 #include <cstdint>
 #include <deque>
 #include <limits>
@@ -43,6 +44,7 @@ class LiveStitcher {
   void step(const MotionStep& step, std::span<const Point> points,
             std::span<const std::int64_t> labels,
             std::span<const std::pair<std::int64_t, std::int64_t>> revised, Report&& report) {
+    assert(!contradicts(revised));
     for (const auto& [detection, label] : revised) revise(detection, label);
     Recent& now = recent_.emplace_back(Recent{}).own();
     now.step = step;
@@ -51,7 +53,8 @@ class LiveStitcher {
     now.labels.assign(labels.begin(), labels.end());
     now.known.resize(points.size());
     n_seen_ += static_cast<std::int64_t>(points.size());
-    if (recent_.size() > n_waiting_) take(recent_[recent_.size() - 1 - n_waiting_].own());
+    if (recent_.size() > n_waiting_ && !is_ahead_) take(recent_[recent_.size() - 1 - n_waiting_].own());
+    is_ahead_ = false;
     stitcher_.guess();
     waiting_.clear();
     markers_.clear();
@@ -61,6 +64,23 @@ class LiveStitcher {
       else if (may_change(*frame))
         report_taken(frame.own(), report);
     if (recent_.size() > n_waiting_ + n_kept_) recent_.pop_front();
+  }
+
+  // Processes the frame that the next step processes first, which is most of its work. The result is
+  // that of the next step alone unless that contradicts.
+  void look_ahead() {
+    if (n_waiting_ == 0 || recent_.size() < n_waiting_ || is_ahead_) return;
+    take(recent_[recent_.size() - n_waiting_].own());
+    is_ahead_ = true;
+  }
+  // Whether corrections change the frame that was processed ahead.
+  bool contradicts(std::span<const std::pair<std::int64_t, std::int64_t>> revised) const {
+    if (!is_ahead_) return false;
+    const Recent& frame = *recent_[recent_.size() - n_waiting_];
+    const std::int64_t end = frame.first + static_cast<std::int64_t>(frame.known.size());
+    return std::ranges::any_of(revised, [&](const auto& one) {
+      return one.first >= frame.first && one.first < end;
+    });
   }
 
   // The present marker of each tracker's label, -1 for none. If several labels have the same marker,
@@ -196,6 +216,7 @@ class LiveStitcher {
   Stitcher stitcher_;
   std::size_t n_waiting_, n_kept_;
   std::int64_t n_seen_ = 0, n_joins_ = 0, n_ghosts_ = 0;
+  bool is_ahead_ = false;
   std::deque<SharedCopy<Recent>> recent_;
   // Scratch of one frame.
   Scratch<std::vector<std::int32_t>> tracklets_;

@@ -141,9 +141,16 @@ class LifeOptions:
 # What all trackers have; there is no such class in the module.
 class _Tracker:
     # (labels, confidence, earlier detections whose label changes, their labels, their confidence,
-    # counts); a confidence is None if the tracker provides none
+    # counts); a confidence is None if the tracker provides none. With a stitcher, which is changed
+    # too, labels are markers; `before` is the stitcher that it is a copy of.
     def step(
-        self, time: float, F: Floats, Q: Floats, points: Floats
+        self,
+        time: float,
+        F: Floats,
+        Q: Floats,
+        points: Floats,
+        stitcher: LiveStitcher | None = None,
+        before: LiveStitcher | None = None,
     ) -> tuple[Ints, Floats | None, Ints, Ints, Floats | None, FrameStats]: ...
     def run(
         self,
@@ -157,8 +164,11 @@ class _Tracker:
         confidence: Floats,
     ) -> None: ...
     def copy(self) -> Self: ...
-    # (ids, frames since the last detection, log odds, means, covariances) of the confirmed tracks
-    def tracks(self) -> tuple[Ints, Ints, Floats, Floats, Floats]: ...
+    # (ids, frames since the last detection, log odds, means, covariances) of the confirmed tracks,
+    # or of the markers of a stitcher
+    def tracks(
+        self, stitcher: LiveStitcher | None = None
+    ) -> tuple[Ints, Ints, Floats, Floats, Floats]: ...
     has_confidence: Final[bool]
     n_frames: Final[int]
     n_seen: Final[int]
@@ -616,6 +626,8 @@ class LiveStitcher:
         revised_labels: Ints,
     ) -> tuple[Ints, Ints, Ints]: ...
     def copy(self) -> LiveStitcher: ...
+    # Does the part of the next step that seldom depends on its frame.
+    def look_ahead(self) -> None: ...
     # As `tracks` of a tracker, of the markers, from that of the tracker of the labels.
     def states(
         self, labels: Ints, gaps: Ints, log_odds: Floats, means: Floats, covariances: Floats

@@ -37,6 +37,13 @@ class Memory:
     def receive(self, timeout):
         if not self._items:
             raise EndOfSource(self.name)
+        if self._period:
+            due = max(self._next + self._period, time.perf_counter() - 0.1)
+            if (wait := due - time.perf_counter()) > timeout:
+                time.sleep(timeout)
+                return None
+            self._next = due
+            time.sleep(max(0.0, wait))
         item = self._items.pop(0)
         if isinstance(item, (int, float)):
             time.sleep(item)
@@ -44,8 +51,6 @@ class Memory:
         if isinstance(item, Exception):
             raise item
         if self._period:
-            self._next = max(self._next + self._period, time.perf_counter() - 0.1)
-            time.sleep(max(0.0, self._next - time.perf_counter()))
             return dataclasses.replace(item, received=time.perf_counter())
         return item
 

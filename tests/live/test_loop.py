@@ -144,7 +144,7 @@ def paused(frames, at, seconds, *, restarts):
 @pytest.mark.parametrize("seconds", [0.03, 0.3, 5.0])
 def test_a_pause_costs_what_a_gap_of_that_length_costs(scene, seconds, restarts, monkeypatch):
     monkeypatch.setattr("asterism.live.loop.MAX_AGE", float("inf"))
-    monkeypatch.setattr("asterism.live.loop.QUEUE", 10_000)
+    monkeypatch.setattr("asterism.live.receiver.QUEUE", 10_000)
     made, model = scene
     d = made.detections
     frames = paused(frames_of(d), 300, seconds, restarts=restarts)

@@ -61,11 +61,11 @@ def test_frames_are_decoded_as_they_were_encoded(version, places, points, number
         np.testing.assert_array_equal(found.marker_sets["Körper"], markers)
     np.testing.assert_array_equal(found.others, points)
     seen = np.flatnonzero(~missing)
-    np.testing.assert_array_equal(found.labelled.positions, np.vstack([markers[seen], points]))
+    np.testing.assert_array_equal(found.labelled["place"], np.vstack([markers[seen], points]))
     ids = [(1 << 16) + i + 1 for i in seen] + [50_000 + i for i in range(len(points))]
-    assert found.labelled.ids.tolist() == ids
+    assert found.labelled["id"].tolist() == ids
     flags = [SOLVED | HAS_MODEL] * len(seen) + [SOLVED | UNLABELLED] * len(points)
-    assert found.labelled.flags.tolist() == flags
+    assert found.labelled["flags"].tolist() == flags
 
 
 @given(VERSION, st.integers(0, 10**6), st.integers(0, 10**6), st.integers(1, 255))

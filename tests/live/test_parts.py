@@ -16,10 +16,10 @@ from asterism.live.estimation import BackgroundEstimator, DirectEstimator, diffe
 from asterism.live.faults import Faults
 from asterism.live.intake import Accepted
 from asterism.live.live_tracker import LiveTracker
-from asterism.live.queue import FrameQueue
-from asterism.live.receiver import Ended
+from asterism.live.receiver import Receiver
+from asterism.live.sources.base import EndOfSource
 from asterism.tracking import Stitched
-from tests.live.sources import frames_of
+from tests.live.sources import Memory, frames_of
 
 
 def test_quantiles_are_those_of_the_durations_within_a_class():
@@ -62,19 +62,16 @@ def test_drift_is_unknown_at_first():
     assert math.isnan(clock.drift)
 
 
-def test_events_are_never_dropped():
-    d = am.simulate.cube(frames=6, seed=1).detections
-    queue = FrameQueue(2, waits=False)
-    frames = frames_of(d)
-    queue.put(frames[0])
-    queue.put(Ended())
-    for frame in frames[1:]:
-        queue.put(frame)
-    got = [queue.get(0.0) for _ in range(4)]
-    assert isinstance(got[0], Ended)
-    assert [f.number for f in got[1:3]] == [4, 5]
-    assert got[3] is None
-    assert queue.n_dropped == 4
+def test_of_the_waiting_frames_the_oldest_are_dropped_and_an_end_comes_after_them(monkeypatch):
+    monkeypatch.setattr("asterism.live.receiver.QUEUE", 2)
+    frames = frames_of(am.simulate.cube(frames=6, seed=1).detections)
+    receiver = Receiver(Memory(frames, waits=False), Faults("test"))
+    assert receiver.next(0.0) is frames[0]
+    while receiver.collect() and receiver.n_dropped < 3:
+        pass
+    assert [receiver.next(0.0).number for _ in range(2)] == [4, 5]
+    with pytest.raises(EndOfSource):
+        receiver.next(0.0)
 
 
 def stepped(tracker, frames):

@@ -50,12 +50,13 @@ def test_session_decodes_to_what_the_sample_client_printed():
         assert [int(b[2]) for b in want["bodies"]] == (bodies["flags"] & 1).tolist()
         assert_printed(bodies["error"], [b[1] for b in want["bodies"]])
         assert_printed(np.hstack([bodies["place"], bodies["rotation"]]), want["poses"])
-        stated = [m.ids >> 16, m.ids & 0xFFFF, m.flags & 1, m.flags >> 1 & 1, m.flags >> 2 & 1]
+        ids, flags = m["id"], m["flags"]
+        stated = [ids >> 16, ids & 0xFFFF, flags & 1, flags >> 1 & 1, flags >> 2 & 1]
         assert np.array([row[:5] for row in want["labelled"]], int).T.tolist() == [
             column.tolist() for column in stated
         ]
-        assert_printed(m.sizes, [row[5] for row in want["labelled"]])
-        assert_printed(m.positions, [row[6:] for row in want["labelled"]])
+        assert_printed(m["size"], [row[5] for row in want["labelled"]])
+        assert_printed(m["place"], [row[6:] for row in want["labelled"]])
         assert (frame.n_skeletons, frame.n_force_plates, frame.n_devices) == (
             want["n_skeletons"], want["n_plates"], want["n_devices"],
         )  # fmt: skip
@@ -86,10 +87,10 @@ def test_echo_repeats_the_time_of_the_client():
 def test_occluded_markers_are_no_points():
     frame = decode_frame(body_of("mocapframe_packet_occluded")[1], (3, 0))
     assert len(frame.marker_sets["FakeTree"]) == 5
-    assert len(frame.labelled.ids) == 4
-    is_occluded = frame.labelled.flags & OCCLUDED > 0
+    assert len(frame.labelled["id"]) == 4
+    is_occluded = frame.labelled["flags"] & OCCLUDED > 0
     assert is_occluded.tolist() == [True, False, False, False]
-    np.testing.assert_array_equal(points_of(frame), frame.labelled.positions[~is_occluded])
+    np.testing.assert_array_equal(points_of(frame), frame.labelled["place"][~is_occluded])
     seen = decode_frame(body_of("mocapframe_packet")[1], (3, 0))
     np.testing.assert_allclose(points_of(seen)[:5], seen.others, atol=1e-6)
     assert points_of(seen).shape == (6, 3)

@@ -127,6 +127,48 @@ def test_a_state_is_a_value():
             np.testing.assert_array_equal(a, b)
 
 
+class Separate(am.tracking.Method):
+    """A method whose steps the engine does not stitch in the same call."""
+
+    name = "separate"
+
+    def __init__(self, method):
+        self.method, self.window = method, getattr(method, "window", 3)
+
+    def init(self, model, **options):
+        return self.method.init(model, **options)
+
+    def step(self, state, time, points, **options):
+        return self.method.step(state, time, points, **options)
+
+
+@pytest.mark.parametrize("method", [am.GNN(), am.SMP(window=3), am.TOMHT()], ids=lambda m: m.name)
+def test_neither_a_call_for_both_nor_a_look_ahead_changes_a_result(method):
+    truth, model = disturbed(2)
+    at_once = am.tracking.Stitched(method=method)
+    apart = am.tracking.Stitched(method=Separate(method))
+    state = ahead = at_once.init(model)
+    other = apart.init(model)
+    n_revised = 0  # frames that revise what was stitched ahead of them
+    for t, (time, points) in enumerate(truth.detections):
+        own = None if t % 5 else np.tile(1e-8 * np.eye(3), (len(points), 1, 1))
+        state, update = at_once.step(state, time, points, covariances=own)
+        if t % 7:
+            at_once.prepare(ahead)
+        ahead, prepared = at_once.step(ahead, time, points, covariances=own)
+        other, separate = apart.step(other, time, points, covariances=own)
+        for same in (prepared, separate):
+            for name in ("labels", "revised", "revised_labels"):
+                np.testing.assert_array_equal(getattr(same, name), getattr(update, name))
+            for name in ("ids", "gaps", "log_odds", "means", "covariances"):
+                a, b = getattr(same.tracks, name), getattr(update.tracks, name)
+                np.testing.assert_array_equal(a, b)
+        first = truth.detections.offsets[max(t - 2, 0)]
+        n_revised += np.any((update.revised >= first) & (update.revised < first + len(points)))
+    assert n_revised > sized(5, 0)
+    assert state.info == ahead.info == other.info
+
+
 def test_empty_frames_and_two_axes():
     rng = np.random.default_rng(0)
     corner = rng.uniform(0, 1, (8, 2))

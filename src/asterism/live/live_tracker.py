@@ -117,6 +117,7 @@ class LiveTracker:
             self._outer = Named(marker_sets=tuple(marker_sets), method=self._inner)
         self.model = model
         self._state: Any = None if model is None else self._outer.init(model, seed=seed)
+        self._before: Any = None  # is kept until there is time to free it
         self._refines = model is None
         self._history: deque[_Past] = deque()
         self._n_forgotten = 0
@@ -154,15 +155,17 @@ class LiveTracker:
         points: NDArray[np.float64],
         covariances: NDArray[np.float64] | None,
     ) -> Update:
-        update = Update(labels=np.full(len(points), -1, dtype=np.int64))
-        if self._state is not None:
+        if self._state is None:
+            update = _unlabelled(points)
+        else:
+            self._before = self._state
             try:
                 self._state, update = self._outer.step(
                     self._state, time, points, covariances=covariances
                 )
             except SolverLimit as error:
                 self._faults.add("too_dense", f"a frame cannot be tracked ({error})")
-                return update
+                return _unlabelled(points)
         self._last_time = time
         if self._refines or self._learns_names:
             self._history.append(_Past(time, points, covariances, update.labels))
@@ -174,6 +177,12 @@ class LiveTracker:
                 self._history.popleft()
                 self._n_forgotten += 1
         return update
+
+    def prepare(self) -> None:
+        """Do what the next frame would have to wait for, and free the memory of the last one."""
+        self._before = None
+        if self._state is not None:
+            self._outer.prepare(self._state)
 
     def _forget(self) -> None:
         """Begin without tracks; new ones get identities that were never used."""
@@ -276,3 +285,7 @@ class LiveTracker:
     def n_names(self) -> int:
         """Number of named tracks."""
         return len(self._state.names) if isinstance(self._state, NamedState) else 0
+
+
+def _unlabelled(points: NDArray[np.float64]) -> Update:
+    return Update(labels=np.full(len(points), -1, dtype=np.int64))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import gc
 import logging
 import math
-import threading
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -13,31 +12,30 @@ from asterism.errors import AsterismError
 from asterism.live.clock import SourceClock
 from asterism.live.estimation import BackgroundEstimator, DirectEstimator, differs
 from asterism.live.faults import Faults
-from asterism.live.frame import LiveFrame, SourceFrame, StreamHeader
+from asterism.live.frame import LiveFrame, StreamHeader
 from asterism.live.intake import Accepted, Intake
 from asterism.live.latency import LatencyHistogram
 from asterism.live.live_run import LiveRun
 from asterism.live.live_tracker import LiveTracker
 from asterism.live.low_latency import low_latency
-from asterism.live.queue import FrameQueue
-from asterism.live.receiver import Connected, Disconnected, Ended, Receiver
+from asterism.live.receiver import Receiver
 from asterism.live.sinks.page import PageSink
+from asterism.live.sources.base import EndOfSource
 
 if TYPE_CHECKING:
+    import threading
     from collections.abc import Callable, Sequence
 
     from asterism.live.estimation import Estimator
     from asterism.live.sinks.base import Sink
     from asterism.live.sources.base import Source
     from asterism.model import MarkerSet, TrackingModel
-    from asterism.tracking.methods import Method, Update
+    from asterism.tracking.methods import Method
 
 __all__ = ["LiveLoop"]
 
 log = logging.getLogger(__name__)
 
-QUEUE = 256
-"""Number of frames that wait at most."""
 MAX_AGE = 1.0
 """Seconds after which a waiting frame is dropped, if a later one waits too."""
 FIRST_SECONDS = 2.0
@@ -85,7 +83,7 @@ class LiveLoop:
         self._first_time: float | None = None
         self._elapsed = 0.0  # seconds of the stream
         self._n_frames = 0
-        self._last: Update | None = None
+        self._last: LiveFrame | None = None
         self._last_arrival = math.inf
         self._is_silent = False
 
@@ -93,9 +91,7 @@ class LiveLoop:
         """Open everything, track until the source ends or `stop` is set, and close everything."""
         source, opened = self._source, list[Any]()
         waits = source.waits
-        queue = FrameQueue(QUEUE, waits=waits)
-        ending = threading.Event()
-        receiver = Receiver(source, queue, ending)
+        receiver = Receiver(source, self._faults)
         try:
             source.open()
             header = StreamHeader(source=source.name, rate=source.rate, names=self._names)
@@ -109,14 +105,9 @@ class LiveLoop:
             if math.isfinite(self._next_estimate):
                 self._estimator.prepare()
             with low_latency():
-                receiver.start()
-                self._follow(queue, intake, stop, status, waits=waits)
+                self._follow(receiver, intake, stop, status, waits=waits)
         finally:
-            ending.set()
-            if receiver.ident is not None:
-                receiver.join(2.0)
-            else:
-                source.close()
+            receiver.close()
             if self._estimator is not None:
                 self._estimator.close()
             for sink in opened:
@@ -140,7 +131,7 @@ class LiveLoop:
 
     def _follow(
         self,
-        queue: FrameQueue,
+        receiver: Receiver,
         intake: Intake,
         stop: threading.Event,
         status: Callable[[LiveRun], Any] | None,
@@ -149,36 +140,33 @@ class LiveLoop:
     ) -> None:
         tracker, next_status, n_dropped = self._tracker, 0.0, 0
         while not stop.is_set():
-            item = queue.get(_IDLE)
-            if isinstance(item, SourceFrame):
-                is_late = not waits and len(queue) > 0 and perf_counter() - item.received > MAX_AGE
-                if is_late or queue.n_dropped > n_dropped:
-                    n = int(is_late) + queue.n_dropped - n_dropped
-                    n_dropped = queue.n_dropped
+            try:
+                frame = receiver.next(_IDLE)
+            except EndOfSource:
+                return
+            if frame is not None:
+                is_late = len(receiver) > 0 and perf_counter() - frame.received > MAX_AGE
+                if is_late or receiver.n_dropped > n_dropped:
+                    n = int(is_late) + receiver.n_dropped - n_dropped
+                    n_dropped = receiver.n_dropped
                     self._faults.add("late", "tracking is behind and frames are dropped", n)
                     intake.dropped(n)
                 if is_late:
                     continue
-                accepted = intake.take(item)
+                accepted = intake.take(frame)
                 if accepted is not None:
                     self._track(accepted, intake.period)
-            elif isinstance(item, Ended):
-                if item.error is not None:
-                    raise item.error
-                return
-            elif isinstance(item, Disconnected):
-                self._faults.add("disconnects", f"{item.message} It is connected again when it can")
-            elif isinstance(item, Connected):
-                log.info("%s: connected again", self._source.name)
             now = perf_counter()
-            self._notice_silence(now, is_frame=item is not None)
-            if now >= next_status and (waits or not len(queue)):
+            self._notice_silence(now, is_frame=frame is not None)
+            if receiver.collect():
+                continue
+            # The next frame is a few milliseconds away: this is the time for everything else.
+            tracker.prepare()
+            if now >= next_status:
                 next_status = now + STATUS
                 self._report(status)
-            # The next frame is a few milliseconds away: this is the time for everything else.
-            if waits or not len(queue):
-                self._learn()
-            while (waits or not len(queue)) and tracker.rehearse():
+            self._learn()
+            while tracker.rehearse() and not receiver.collect():
                 pass
 
     def _report(self, status: Callable[[LiveRun], Any] | None) -> None:
@@ -195,15 +183,15 @@ class LiveLoop:
         if self._first_time is None:
             self._first_time = frame.time
         self._elapsed = frame.time - self._first_time
-        self._last = update = self._tracker.step(accepted, period)
-        done = LiveFrame(
+        update = self._tracker.step(accepted, period)
+        self._last = last = LiveFrame(
             number=frame.number, time=frame.time, points=frame.points, labels=update.labels,
-            names=update.names, read_tracks=lambda: update.tracks, received=frame.received,
+            names=update.names, read_tracks=update.read_tracks, received=frame.received,
             done=perf_counter(),
         )  # fmt: skip
         for sink in tuple(self._sinks):
             try:
-                sink.send(done)
+                sink.send(last)
             except (AsterismError, OSError) as error:
                 self._faults.add("sinks", f"{sink.name} fails and is left out ({error})")
                 self._sinks.remove(sink)

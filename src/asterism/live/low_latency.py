@@ -14,7 +14,7 @@ __all__ = ["low_latency"]
 
 SWITCH_SECONDS = 2e-4
 """Longest time for which a thread keeps the interpreter while another one waits; 5 ms by default.
-The receiver waits that long at most, while a frame is tracked."""
+The loop waits that long at most, while a server answers a client."""
 
 
 @contextmanager

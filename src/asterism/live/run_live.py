@@ -37,7 +37,7 @@ def run(
 ) -> LiveRun:
     """Track a stream frame by frame, and pass every frame on with its identities.
 
-    A thread receives; this call tracks and returns when the source ends or `stop` is set. Without
+    This call receives, tracks and sends; it returns when the source ends or `stop` is set. Without
     a model, one is estimated from the first two seconds, whose frames have no identities yet. It is
     refined after 10, 30 and 60 s and then every minute, in a process of its own; tracks keep their
     identities. A frame that arrives out of order, twice or too late is dropped and counted. A lost

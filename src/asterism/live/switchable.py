@@ -84,11 +84,13 @@ class Switchable(Method[SwitchableState]):
         """Process the next frame; see `Method.step`."""
         inner, found = self.method.step(state.inner, time, points, covariances=covariances)
         ids, next_id = state.ids, state.next_id
-        highest = int(found.labels.max(initial=-1))
+        highest = max(found.labels.tolist(), default=-1)  # faster than by NumPy
         if len(found.revised_labels):
             highest = max(highest, int(found.revised_labels.max()))
         if ids is None:
-            return SwitchableState(inner=inner, next_id=max(next_id, highest + 1)), found
+            next_id = max(next_id, highest + 1)
+            after = SwitchableState(inner=inner, ids=None, next_id=next_id, n_before=state.n_before)
+            return after, found
         if highest >= len(ids):
             n_new = highest + 1 - len(ids)
             ids = np.concatenate([ids, np.arange(next_id, next_id + n_new)])
@@ -101,6 +103,10 @@ class Switchable(Method[SwitchableState]):
             revised_labels=_mapped(found.revised_labels, ids),
             read_tracks=partial(_tracks_of, found, ids),
         )
+
+    def prepare(self, state: SwitchableState) -> None:
+        """Prepare the next step of the method; see `Method.prepare`."""
+        self.method.prepare(state.inner)
 
 
 def _mapped(labels: NDArray[np.int64], ids: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -138,6 +138,7 @@ def _tracks(states: TrackStates) -> dict[str, Any]:
 def _places(places: NDArray[np.float64]) -> Any:
     """Return coordinates as JSON holds them: null for a row that is not finite."""
     flat = np.ascontiguousarray(places)
-    if math.isfinite(np.vdot(flat, flat)):  # faster than to look at each
+    line = flat.reshape(-1)
+    if math.isfinite(line.dot(line)):  # faster than to look at each
         return flat
     return [row if all(map(math.isfinite, row)) else None for row in places.tolist()]

@@ -27,7 +27,6 @@ __all__ = [
     "UNLABELLED",
     "VERSIONS",
     "FrameOfData",
-    "Labelled",
     "Message",
     "Reader",
     "decode_frame",
@@ -47,6 +46,8 @@ _LARGEST_BODY = 65_507 - 4
 _LABELLED = np.dtype(
     [("id", "<u4"), ("place", "<f4", 3), ("size", "<f4"), ("flags", "<u2"), ("residual", "<f4")]
 )
+_WITHOUT_LABEL = np.array((0, (0, 0, 0), _MARKER_SIZE, SOLVED | UNLABELLED, 0), _LABELLED)
+_NONE = np.empty(0, dtype=np.intp)
 _BODY = np.dtype(
     [("id", "<i4"), ("place", "<f4", 3), ("rotation", "<f4", 4), ("error", "<f4"), ("flags", "<u2")]
 )
@@ -72,30 +73,6 @@ class Message(IntEnum):
     UNRECOGNIZED = 100
 
 
-class Labelled(NamedTuple):
-    """Labelled markers of a frame, which include points without a label.
-
-    Attributes
-    ----------
-    ids : ndarray of int, shape (N,)
-        Upper 16 bits: the model; lower 16 bits: the marker.
-    positions : ndarray of shape (N, 3)
-        Metres.
-    sizes : ndarray of shape (N,)
-        Diameters, metres.
-    flags : ndarray of int, shape (N,)
-        Sums of `OCCLUDED`, `SOLVED`, `HAS_MODEL`, `UNLABELLED` and others.
-    residuals : ndarray of shape (N,)
-        Mean distance between the marker and its rays, metres.
-    """
-
-    ids: NDArray[np.int64]
-    positions: NDArray[np.float64]
-    sizes: NDArray[np.float64]
-    flags: NDArray[np.int64]
-    residuals: NDArray[np.float64]
-
-
 class FrameOfData(NamedTuple):
     """Content of a frame.
 
@@ -113,8 +90,11 @@ class FrameOfData(NamedTuple):
         Rigid bodies: ``id``, ``place``, ``rotation`` (x, y, z, w), ``error`` and ``flags``.
     n_skeletons, n_force_plates, n_devices : int
         Numbers of the parts that are skipped.
-    labelled : Labelled
-        Labelled markers.
+    labelled : ndarray of records
+        Labelled markers, which include points without a label: ``id`` (upper 16 bits: the model;
+        lower 16 bits: the marker), ``place``, ``size`` (diameter, metres), ``flags`` (sum of
+        `OCCLUDED`, `SOLVED`, `HAS_MODEL`, `UNLABELLED` and others) and ``residual`` (mean distance
+        between the marker and its rays, metres).
     exposed, received, sent : int
         High-resolution times of the server's clock: middle of the exposure, arrival of the data of
         the cameras, and transmission.
@@ -122,11 +102,11 @@ class FrameOfData(NamedTuple):
 
     number: int
     time: float
-    marker_sets: dict[str, NDArray[np.float64]]
-    others: NDArray[np.float64]
+    marker_sets: dict[str, NDArray[np.float32]]
+    others: NDArray[np.float32]
     bodies: NDArray[np.void]
     n_skeletons: int
-    labelled: Labelled
+    labelled: NDArray[np.void]
     n_force_plates: int
     n_devices: int
     exposed: int
@@ -152,8 +132,7 @@ class Reader:
         return len(self._body) - self._at
 
     def values(self, layout: str) -> tuple[float, ...]:
-        """Read numbers of a layout of `struct`, without its byte order."""
-        layout = f"<{layout}"
+        """Read numbers of a layout of `struct`."""
         return struct.unpack(layout, self.take(struct.calcsize(layout)))
 
     def count(self) -> int:
@@ -263,15 +242,15 @@ def encode_frame(
         If the frame does not fit into a datagram.
     """
     is_sized = version >= (4, 1)
-    seen = np.flatnonzero(np.isfinite(markers).all(axis=1))
-    rows = np.zeros(len(seen) + len(points), _LABELLED)
-    rows["id"][: len(seen)] = (1 << 16) + 1 + seen
-    rows["id"][len(seen) :] = ids & 0xFFFF
-    rows["place"][: len(seen)] = markers[seen]
-    rows["place"][len(seen) :] = points
-    rows["size"] = _MARKER_SIZE
-    rows["flags"][: len(seen)] = SOLVED | HAS_MODEL
-    rows["flags"][len(seen) :] = SOLVED | UNLABELLED
+    seen = np.flatnonzero(np.isfinite(markers).all(axis=1)) if len(markers) else _NONE
+    n_seen = len(seen)
+    rows = np.full(n_seen + len(points), _WITHOUT_LABEL)
+    rows["id"][n_seen:] = ids & 0xFFFF
+    rows["place"][n_seen:] = points
+    if n_seen:
+        rows["id"][:n_seen] = (1 << 16) + 1 + seen
+        rows["place"][:n_seen] = markers[seen]
+        rows["flags"][:n_seen] = SOLVED | HAS_MODEL
 
     sets = [_set(marker_set, markers)] if len(markers) else []
     empty = _section([], is_sized)
@@ -327,8 +306,8 @@ def decode_frame(body: bytes | memoryview, version: tuple[int, int]) -> FrameOfD
             reader.take(4)
         return n
 
-    (number,) = reader.values("I")
-    sets: dict[str, NDArray[np.float64]] = {}
+    (number,) = reader.values("<I")
+    sets: dict[str, NDArray[np.float32]] = {}
     for _ in range(begin()):
         name = reader.text()
         sets[name] = _places(reader, reader.count())
@@ -345,7 +324,7 @@ def decode_frame(body: bytes | memoryview, version: tuple[int, int]) -> FrameOfD
             reader.rows(reader.count(), _LABELLED)
     rows = reader.rows(begin(), _LABELLED)
     n_plates, n_devices = _skip_channels(reader, begin()), _skip_channels(reader, begin())
-    _, _, time, exposed, received, sent = reader.values("IIdQQQ")
+    _, _, time, exposed, received, sent = reader.values("<IIdQQQ")
     return FrameOfData(
         number=int(number),
         time=float(time),
@@ -353,13 +332,7 @@ def decode_frame(body: bytes | memoryview, version: tuple[int, int]) -> FrameOfD
         others=others,
         bodies=bodies,
         n_skeletons=n_skeletons,
-        labelled=Labelled(
-            rows["id"].astype(np.int64),
-            rows["place"].astype(np.float64),
-            rows["size"].astype(np.float64),
-            rows["flags"].astype(np.int64),
-            rows["residual"].astype(np.float64),
-        ),
+        labelled=rows,
         n_force_plates=n_plates,
         n_devices=n_devices,
         exposed=int(exposed),
@@ -368,8 +341,8 @@ def decode_frame(body: bytes | memoryview, version: tuple[int, int]) -> FrameOfD
     )
 
 
-def _places(reader: Reader, n: int) -> NDArray[np.float64]:
-    return np.frombuffer(reader.take(12 * n), "<f4").reshape(n, 3).astype(np.float64)
+def _places(reader: Reader, n: int) -> NDArray[np.float32]:
+    return np.frombuffer(reader.take(12 * n), "<f4").reshape(n, 3)
 
 
 def _skip_channels(reader: Reader, n: int) -> int:

@@ -99,7 +99,7 @@ def decode_server_info(body: bytes | memoryview) -> ServerInfo:
     major, minor, _, _ = reader.take(4)
     if major < 3:
         return ServerInfo(application, (major, minor), 0, 0, "")
-    rate, port, is_multicast = reader.values("QHB")
+    rate, port, is_multicast = reader.values("<QHB")
     group = ".".join(map(str, reader.take(4)))
     return ServerInfo(
         application, (major, minor), int(rate), int(port), group if is_multicast else ""
@@ -143,7 +143,7 @@ def decode_marker_sets(
     reader = Reader(body)
     found: dict[str, tuple[str, ...]] = {}
     for _ in range(reader.count()):
-        (kind,) = reader.values("I")
+        (kind,) = reader.values("<I")
         part = reader
         if version >= (4, 1):
             part = Reader(reader.take(reader.count()))

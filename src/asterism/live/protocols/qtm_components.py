@@ -24,6 +24,7 @@ __all__ = [
     "decode_2d",
     "decode_markers",
     "decode_points",
+    "decode_positions",
     "encode_2d",
     "encode_nothing",
     "encode_positions",
@@ -123,6 +124,8 @@ def encode_positions(
     order : str
         Byte order.
     """
+    if not len(positions):
+        return encode_nothing(kind, order)
     rows = np.zeros(len(positions), _ROWS[order, kind])
     rows["place"] = positions * _MM
     is_nan = np.isnan(positions)
@@ -147,7 +150,7 @@ def decode_markers(
         If the component is truncated.
     """
     kind = Component.MARKERS_RESIDUAL if residuals else Component.MARKERS
-    return _rows(body, kind, order)["place"].astype(np.float64) / _MM
+    return decode_positions(body, kind, order)
 
 
 def decode_points(
@@ -162,7 +165,24 @@ def decode_points(
     """
     kind = Component.POINTS_RESIDUAL if residuals else Component.POINTS
     rows = _rows(body, kind, order)
-    return rows["place"].astype(np.float64) / _MM, rows["id"].astype(np.int64)
+    return _metres(rows), rows["id"].astype(np.int64)
+
+
+def decode_positions(
+    body: bytes | memoryview, kind: Component, order: str = "<"
+) -> NDArray[np.float64]:
+    """Return the positions of a component of markers or points, shape (N, 3), metres.
+
+    Raises
+    ------
+    PacketError
+        If the component is truncated.
+    """
+    return _metres(_rows(body, kind, order))
+
+
+def _metres(rows: NDArray[np.void]) -> NDArray[np.float64]:
+    return np.divide(rows["place"], _MM, dtype=np.float64)
 
 
 def _rows(body: bytes | memoryview, kind: Component, order: str) -> NDArray[np.void]:

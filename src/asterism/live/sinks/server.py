@@ -66,7 +66,8 @@ def served(frame: LiveFrame, place: dict[str, int]) -> ServedFrame:
     place : dict of str to int
         Place of each name among the markers; a point of another name is one of the other points.
     """
-    markers = np.full((len(place), 3), np.nan)
+    markers = np.empty((len(place), 3))
+    markers.fill(np.nan)
     points, labels = frame.points, frame.labels
     if frame.names is not None:
         at = np.array([-1 if n is None else place.get(n, -1) for n in frame.names], dtype=np.int64)
@@ -74,5 +75,6 @@ def served(frame: LiveFrame, place: dict[str, int]) -> ServedFrame:
         markers[at[is_named]] = points[is_named]
         points, labels = points[~is_named], labels[~is_named]
     return ServedFrame(
-        number=frame.number, time=frame.time, markers=markers, points=points, ids=labels + 1
-    )
+        number=frame.number, time=frame.time, markers=markers, points=points, ids=labels + 1,
+        images=None,
+    )  # fmt: skip

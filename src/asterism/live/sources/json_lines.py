@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import queue
-import select
 import socket
 import sys
 import threading
@@ -89,13 +87,13 @@ class UdpSource:
                 line, arrived = self._lines.pop(0)
                 if (frame := decoded(line, arrived, self._faults)) is not None:
                     return frame
-            left = max(0.0, end - time.monotonic())
-            if not select.select([self._socket], [], [], left)[0]:
-                return None
-            with contextlib.suppress(OSError):
+            self._socket.settimeout(max(0.0, end - time.monotonic()))
+            try:
                 packet = self._socket.recv(_READ)
-                arrived = time.perf_counter()
-                self._lines = [(line, arrived) for line in packet.splitlines() if line.strip()]
+            except OSError:  # in time there was none
+                return None
+            arrived = time.perf_counter()
+            self._lines = [(line, arrived) for line in packet.splitlines() if line.strip()]
 
     def close(self) -> None:
         """Stop listening."""
@@ -171,4 +169,6 @@ def decoded(line: bytes, arrived: float, faults: Faults) -> SourceFrame | None:
     except PacketError as error:
         faults.undecoded(error)
         return None
-    return SourceFrame(number=number, time=seconds, points=points, received=arrived)
+    return SourceFrame(
+        number=number, time=seconds, points=points, received=arrived, covariances=None
+    )

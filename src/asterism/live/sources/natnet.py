@@ -10,6 +10,8 @@ import time
 from collections import deque
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from asterism.errors import SourceError, SourceLost
 from asterism.live.faults import Faults
 from asterism.live.frame import SourceFrame
@@ -26,7 +28,6 @@ from asterism.live.protocols.natnet_messages import decode_server_info, encode_c
 from asterism.live.protocols.packet_error import PacketError
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
 __all__ = ["NatNetSource", "points_of"]
@@ -195,8 +196,9 @@ class NatNetSource:
             self._faults.undecoded(error)
             return None
         return SourceFrame(
-            number=frame.number, time=frame.time, points=points_of(frame), received=arrived
-        )
+            number=frame.number, time=frame.time, points=points_of(frame), received=arrived,
+            covariances=None,
+        )  # fmt: skip
 
     def close(self) -> None:
         """Disconnect."""
@@ -213,9 +215,13 @@ def points_of(frame: FrameOfData) -> NDArray[np.float64]:
     The labelled markers include the points without a label. An occluded one is a prediction of
     Motive and is left out. If Motive sends no labelled markers, the other markers are taken.
     """
-    if len(frame.labelled.ids):
-        return frame.labelled.positions[frame.labelled.flags & OCCLUDED == 0]
-    return frame.others
+    rows = frame.labelled
+    if not len(rows):
+        return frame.others.astype(np.float64)
+    points, flags = rows["place"].astype(np.float64), rows["flags"]
+    if np.bitwise_or.reduce(flags) & OCCLUDED:
+        return points[flags & OCCLUDED == 0]
+    return points
 
 
 def _joined(group: str, port: int, local: str) -> socket.socket:

@@ -21,7 +21,7 @@ from asterism.live.protocols.qtm_components import (
     Component,
     decode_2d,
     decode_markers,
-    decode_points,
+    decode_positions,
 )
 from asterism.live.protocols.qtm_parameters import read_calibration, read_parameters
 from asterism.live.sources.camera_images import CameraImages, ImageFrame
@@ -228,19 +228,19 @@ class QtmSource:
             return []
 
     def _frame(self, data: DataPacket) -> SourceFrame:
-        points: list[np.ndarray[tuple[int, int], np.dtype[np.float64]]] = []
+        points = np.empty((0, 3))
+        if Component.POINTS in data.components:
+            points = decode_positions(data.components[Component.POINTS], Component.POINTS)
         if Component.MARKERS in data.components:
             markers = decode_markers(data.components[Component.MARKERS])
-            # All 32 bits set mark a marker that is not there.
-            points.append(markers[~np.isnan(markers).all(axis=1)])
-        if Component.POINTS in data.components:
-            points.append(decode_points(data.components[Component.POINTS])[0])
+            if len(markers):
+                # All 32 bits set mark a marker that is not there.
+                seen = markers[~np.isnan(markers).all(axis=1)]
+                points = np.concatenate([seen, points])
         return SourceFrame(
-            number=data.number,
-            time=data.time,
-            points=np.concatenate([np.empty((0, 3)), *points]),
-            received=self._arrived,
-        )
+            number=data.number, time=data.time, points=points, received=self._arrived,
+            covariances=None,
+        )  # fmt: skip
 
     def _image_frame(self, data: DataPacket) -> ImageFrame:
         if Component.IMAGE_POINTS not in data.components:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import field
 from functools import cached_property
-from math import isfinite
+from math import inf, isfinite
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
@@ -54,6 +54,8 @@ class MethodState(Protocol):
 
 
 State = TypeVar("State", bound=MethodState)
+
+_FLOAT = np.dtype(np.float64)  # there is one such object in a process
 
 
 def _nothing() -> NDArray[np.int64]:
@@ -200,6 +202,18 @@ class Method(ABC, Generic[State]):
             not finite numbers.
         """
 
+    def prepare(self, state: State) -> None:
+        """Do what the next `step` from a state needs and does not depend on its frame.
+
+        A loop that waits for frames calls it meanwhile, so that the next frame takes less time. It
+        changes no result; by default there is nothing to prepare.
+
+        Parameters
+        ----------
+        state : State
+            State from `init` or a step.
+        """
+
     def run(
         self,
         state: State,
@@ -282,7 +296,8 @@ def checked_frame(
     asterism.errors.ParameterError: time: expected later than the frame before (0.01 s), found 0.01
     s. Sort the frames by time and drop repeated ones.
     """
-    check_number("time", time)
+    if not (type(time) is float and last_time < time < inf):
+        check_number("time", time)
     if time <= last_time:
         raise ParameterError(
             "time",
@@ -291,7 +306,7 @@ def checked_frame(
             "sort the frames by time and drop repeated ones",
         )
     array = np.asarray(points)
-    if array.dtype == np.float64 and array.shape[1:] == (n_axes,) and array.flags.c_contiguous:
+    if array.dtype is _FLOAT and array.shape[1:] == (n_axes,) and array.flags.c_contiguous:
         flat = array.reshape(-1)
         if isfinite(flat.dot(flat)):  # faster than the check below, which says what is wrong
             return array

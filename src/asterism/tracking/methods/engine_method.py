@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import replace
+from dataclasses import field, replace
 from functools import partial
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from asterism import _engine
 from asterism.checks import check_kind
 from asterism.errors import ParameterError, SolverLimit
 from asterism.model import TrackingModel
+from asterism.model.compiled import no_transition, steps_of, transition, with_noise
 from asterism.records import record
 from asterism.tracking.methods import options
 from asterism.tracking.methods.base import Method, Update, checked_covariances, checked_frame
@@ -22,7 +25,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from asterism import _engine
     from asterism.model import Detections
 
     Tracker = (
@@ -55,6 +57,8 @@ class EngineState:
         Current tracks in the engine.
     about : callable
         Function that returns the method's counts of a frame or of all frames so far.
+    prepared : list of trackers
+        A copy of the tracker for the next step, if one was made in advance.
 
     Examples
     --------
@@ -74,6 +78,7 @@ class EngineState:
     n_axes: int
     tracker: Tracker
     about: Callable[[_engine.FrameStats], dict[str, float]]
+    prepared: list[Tracker] = field(default_factory=list[Any])
 
     def __repr__(self) -> str:
         return (
@@ -106,8 +111,6 @@ class EngineState:
             marker exists, ``means (k, D, n)`` and ``covariances (k, n, n)`` of the state, SI units;
             with a χ² test also ``chi2 (k,)`` λ and ``updates (k,)`` detections so far.
         """
-        from asterism import _engine
-
         names = ("ids", "gaps", "log_odds", "means", "covariances")
         live: dict[str, NDArray[Any]] = dict(zip(names, self.tracker.tracks(), strict=True))
         if isinstance(self.tracker, _engine.TreeTracker):
@@ -189,33 +192,65 @@ class EngineMethod(Method[EngineState]):
         SolverLimit
             If a gate contains too many detections for the memory.
         """
-        from asterism import _engine
-        from asterism.model.compiled import no_transition, transition, with_noise
+        return self.step_stitched(state, None, None, time, points, covariances)
 
+    def step_stitched(
+        self,
+        state: EngineState,
+        stitcher: _engine.LiveStitcher | None,
+        before: _engine.LiveStitcher | None,
+        time: float,
+        points: ArrayLike,
+        covariances: ArrayLike | None,
+    ) -> tuple[EngineState, Update]:
+        """Process the next frame as `step` does, and stitch its tracklets in the same call.
+
+        Parameters
+        ----------
+        state, time, points, covariances
+            As for `Method.step`.
+        stitcher : LiveStitcher, optional
+            Copy of `before` that is changed; it may have looked ahead. The update is that of the
+            markers.
+        before : LiveStitcher, optional
+            Markers before the frame.
+
+        Returns
+        -------
+        state, update
+            As for `Method.step`.
+        """
         check_kind("state", state, EngineState, "method.init(model)")
-        tracker = state.tracker.copy()
+        tracker = state.prepared.pop() if state.prepared else state.tracker.copy()
         self._check(state, time, points)
-        frame = checked_frame(time, tracker.last_time, points, state.n_axes)
+        last_time = tracker.last_time
+        frame = checked_frame(time, last_time, points, state.n_axes)
         if covariances is not None:
             frame = with_noise(frame, checked_covariances(covariances, frame))
-        # The first frame has no step before it and no tracks, so no transition is needed.
-        dt = time - tracker.last_time if tracker.n_frames else None
         motion = state.model.motion
-        F, Q = transition(motion, dt) if dt else no_transition(motion)
+        # The first frame has no step before it and no tracks, so no transition is needed.
+        is_first = last_time == -inf
+        F, Q = no_transition(motion) if is_first else transition(motion, time - last_time)
         try:
             labels, sure, revised, revised_labels, revised_sure, stats = tracker.step(
-                time, F, Q, frame
+                time, F, Q, frame, stitcher, before
             )
         except (_engine.CandidateLimit, _engine.FrontierLimit) as error:
             raise _too_many(error) from error
+        # Records are made fastest with all fields.
         after = EngineState(
-            model=state.model, n_axes=state.n_axes, tracker=tracker, about=state.about
+            model=state.model, n_axes=state.n_axes, tracker=tracker, about=state.about, prepared=[]
         )
         return after, Update(
             labels=labels, revised=revised, revised_labels=revised_labels, confidence=sure,
-            revised_confidence=revised_sure, info=self._about(stats),
-            read_tracks=partial(_tracks_of, tracker),
+            revised_confidence=revised_sure, info=self._about(stats), names=None,
+            read_tracks=partial(_tracks_of, tracker, stitcher),
         )  # fmt: skip
+
+    def prepare(self, state: EngineState) -> None:
+        """Copy the tracker for the next step; see `Method.prepare`."""
+        if not state.prepared:
+            state.prepared.append(state.tracker.copy())
 
     def _check(self, state: EngineState, time: float, points: ArrayLike) -> None:
         """Raise if the method cannot take the frame."""
@@ -239,9 +274,6 @@ class EngineMethod(Method[EngineState]):
         state, labels, confidence
             Last state, label of every detection (N,), and confidences if the method estimates them.
         """
-        from asterism import _engine
-        from asterism.model.compiled import steps_of, with_noise
-
         check_kind("state", state, EngineState, "method.init(model)")
         points = with_noise(detections.points, detections.covariances)
         tracker = state.tracker.copy()
@@ -267,16 +299,15 @@ class EngineMethod(Method[EngineState]):
             if progress is not None:
                 progress(end)
         confidence = sure[first:] if tracker.has_confidence else None
-        return replace(state, tracker=tracker), labels[first:], confidence
+        after = replace(state, tracker=tracker, prepared=[])
+        return after, labels[first:], confidence
 
 
-def _tracks_of(tracker: Tracker) -> TrackStates:
-    return states_of(*tracker.tracks())
+def _tracks_of(tracker: Tracker, stitcher: _engine.LiveStitcher | None) -> TrackStates:
+    return states_of(*tracker.tracks(stitcher))
 
 
 def _too_many(error: Exception) -> SolverLimit:
-    from asterism import _engine
-
     if isinstance(error, _engine.FrontierLimit):
         return SolverLimit(
             "tracks that compete at once",

@@ -104,7 +104,7 @@ class TrackStates:
         """Existence probability of each track, shape (K,), ``1 / (1 + exp(-log_odds))``."""
         if self.log_odds is None:
             return None
-        return 1 / (1 + np.exp(-np.clip(self.log_odds, -700.0, 700.0)))
+        return 1 / (1 + np.exp(-np.maximum(self.log_odds, -700.0)))
 
 
 def states_of(
@@ -117,5 +117,5 @@ def states_of(
     """Return states in the order in which the engine returns them."""
     return TrackStates(
         ids=ids, means=means, covariances=covariances, gaps=gaps, log_odds=log_odds,
-        names=(None,) * len(ids),
+        names=(None,) * len(ids), identity_confidence=None,
     )  # fmt: skip

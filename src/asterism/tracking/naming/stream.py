@@ -231,6 +231,10 @@ class Named(Method[NamedState]):
         read = partial(_tracks_of, update, after)
         return after, replace(update, names=names, read_tracks=read)
 
+    def prepare(self, state: NamedState) -> None:
+        """Prepare the next step of the method; see `Method.prepare`."""
+        self.method.prepare(state.tracks)
+
     def _searched(self, state: NamedState) -> NamedState:
         """Search for the first names as soon as there are enough frames and tracks."""
         recent, now = state.recent, state.recent[-1].time

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import field, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -15,6 +15,7 @@ from asterism.model.compiled import motion_model, no_transition, transition
 from asterism.records import record
 from asterism.tracking.methods import SMP, Method, TrackStates, Update
 from asterism.tracking.methods.base import MethodState, checked_frame
+from asterism.tracking.methods.engine_method import EngineMethod, EngineState
 from asterism.tracking.methods.states import states_of
 from asterism.tracking.stitching.tracklets import tracklet_model
 from asterism.tracking.stitching.whole import check_options, stitch_options
@@ -41,6 +42,8 @@ class StitchedState:
         Number of coordinates, 2 or 3.
     last_time : float
         Time of the last frame, seconds; -inf before the first.
+    prepared : list of LiveStitcher
+        A copy of the stitcher for the next step that has looked ahead, if one was made.
 
     Examples
     --------
@@ -59,6 +62,7 @@ class StitchedState:
     model: TrackingModel
     n_axes: int
     last_time: float = float("-inf")
+    prepared: list[_engine.LiveStitcher] = field(default_factory=list[_engine.LiveStitcher])
 
     def __repr__(self) -> str:
         stitcher = self.stitcher
@@ -188,22 +192,47 @@ class Stitched(Method[StitchedState]):
             Next state, and the labels of markers that the frame decides or revises.
         """
         check_kind("state", state, StitchedState, "method.init(model)")
-        frame = checked_frame(time, state.last_time, points, state.n_axes)
-        tracklets, found = self.method.step(state.tracklets, time, frame, covariances=covariances)
-        motion, dt = state.model.motion, time - state.last_time
-        F, Q = no_transition(motion) if dt == float("inf") else transition(motion, dt)
-        stitcher = state.stitcher.copy()
-        labels, revised, revised_labels = stitcher.step(
-            F, Q, frame, found.labels, found.revised, found.revised_labels
-        )
+        tracklets, method = state.tracklets, self._engine_method
+        if method is not None and isinstance(tracklets, EngineState):
+            stitcher = state.prepared.pop() if state.prepared else state.stitcher.copy()
+            tracklets, update = method.step_stitched(
+                tracklets, stitcher, state.stitcher, time, points, covariances
+            )
+        else:
+            stitcher = state.stitcher.copy()
+            frame = checked_frame(time, state.last_time, points, state.n_axes)
+            tracklets, found = self.method.step(tracklets, time, frame, covariances=covariances)
+            motion, dt = state.model.motion, time - state.last_time
+            F, Q = no_transition(motion) if dt == float("inf") else transition(motion, dt)
+            labels, revised, revised_labels = stitcher.step(
+                F, Q, frame, found.labels, found.revised, found.revised_labels
+            )
+            update = Update(
+                labels=labels, revised=revised, revised_labels=revised_labels, info=found.info,
+                read_tracks=partial(_tracks_of, stitcher, found),
+            )  # fmt: skip
         after = StitchedState(
             tracklets=tracklets, stitcher=stitcher, model=state.model, n_axes=state.n_axes,
-            last_time=time,
+            last_time=time, prepared=[],
         )  # fmt: skip
-        return after, Update(
-            labels=labels, revised=revised, revised_labels=revised_labels, info=found.info,
-            read_tracks=partial(_tracks_of, stitcher, found),
-        )  # fmt: skip
+        return after, update
+
+    @cached_property
+    def _engine_method(self) -> EngineMethod | None:
+        """The method, if it tracks and stitches in one call; None otherwise."""
+        return self.method if isinstance(self.method, EngineMethod) else None
+
+    def prepare(self, state: StitchedState) -> None:
+        """Do most of the next step's stitching, and prepare its method; see `Method.prepare`.
+
+        The frame that waits longest is stitched on a copy. If the method revises it in the next
+        step, that copy is not used.
+        """
+        if self._engine_method is not None and not state.prepared:
+            ahead = state.stitcher.copy()
+            ahead.look_ahead()
+            state.prepared.append(ahead)
+        self.method.prepare(state.tracklets)
 
 
 def _tracks_of(stitcher: _engine.LiveStitcher, found: Update) -> TrackStates | None:
