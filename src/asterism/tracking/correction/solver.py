@@ -10,7 +10,14 @@ import numpy as np
 
 from asterism.model import Tracks
 from asterism.tracking.confidence.identity import assess
-from asterism.tracking.confidence.reassign import PROBABLE, UNCERTAIN, reassigned
+from asterism.tracking.confidence.reassign import (
+    FOR_PERSON,
+    PROBABLE,
+    UNCERTAIN,
+    gains,
+    reassigned,
+)
+from asterism.tracking.correction.change import without_improbable
 from asterism.tracking.correction.constraints import Constraints, detections_of
 from asterism.tracking.correction.continuation import continuation
 from asterism.tracking.correction.evidence import Evidence
@@ -359,13 +366,17 @@ class Solver:
         is_open = (self.labels >= 0) & (assessed < UNCERTAIN) | self._free()
         is_open[[*self._constraints.pinned, *self._constraints.kept, *kept]] = False
         labels, is_placed = with_lost_segments(tracks, is_open)
-        tracks, is_open = replace(tracks, labels=labels), is_open & ~is_placed
-        labels = reassigned(tracks, is_open, self.evidence.ghost, self._model.sensor.noise_sigma)
+        ghost, noise_sigma = self.evidence.ghost, self._model.sensor.noise_sigma
+        placed = replace(tracks, labels=labels)
+        labels = reassigned(placed, is_open & ~is_placed, ghost, noise_sigma, FOR_PERSON)
         # Without distances at its best, a marker is no clutter: its identity must be improbable.
         slots = self._d.frame_of * len(self.names)
         is_back = (self.labels >= 0) & (labels < 0) & (assessed > 1 - UNCERTAIN)
         is_back &= ~np.isin(slots + self.labels, (slots + labels)[labels >= 0])
-        self.labels = np.where(is_back, self.labels, labels)
+        labels = np.where(is_back, self.labels, labels)
+        odds = gains(tracks, labels, ghost, noise_sigma)
+        odds[is_placed] = PROBABLE  # at least, by the distances among them
+        self.labels = without_improbable(self.labels, labels, odds, self._d.frame_of)
 
     def _free(self) -> NDArray[np.bool_]:
         """Return which detections have no track, without those that an edit is about.
