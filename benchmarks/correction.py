@@ -31,7 +31,7 @@ from __future__ import annotations
 import argparse
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -80,6 +80,8 @@ WORTH = 3
 """Number of detections that an action must mend where an assignment is confirmed."""
 SHARE = 4
 """Of the longest wrong stretch, the divisor of the number of detections that it must mend too."""
+PREVIEWS = 5
+"""Number of stretches of which statements are previewed before one is made."""
 NEAR = 25
 """Frames between detections of one stretch at most."""
 
@@ -96,7 +98,6 @@ class Corrector:
         self.seen: set[int] = set()
         self.looked: set[tuple[int, int, int]] = set()
         self.actions = self.looks = self.refused = 0
-        self.undoes = True
         self.seconds: list[float] = []
 
     @property
@@ -118,12 +119,8 @@ class Corrector:
     def run(self, goal: float, limit: int) -> None:
         """Act until the IDF1 is at the goal, nothing is left to do, or the limit is reached."""
         while self.actions < limit and idf1(self.labels, self.truth) < goal:
-            if self.part() or self.reassign(limit) or self.choose() or self.search():
-                continue
-            if not self.undoes:
+            if not (self.part() or self.reassign(limit) or self.say()):
                 return
-            self.undoes = False
-            self.seen.clear()
 
     def part(self) -> bool:
         """State that two stated markers, which are on one track, are different."""
@@ -137,12 +134,12 @@ class Corrector:
                 return True
         return False
 
-    def choose(self) -> bool:
-        """Answer the offered identity that has the most wrong detections."""
+    def offered(self) -> list[int]:
+        """Return a detection of the offered identity that has the most wrong detections."""
         tracks = am.tracking.assess(self.correction.tracks, self.model, self.stitching)
         pinned = self.correction.constraints.pinned
         main = np.append(self.mains(), -1)
-        best, found = self.longest()[0] - 1, -1
+        most, found = 0, []
         for each in tracks.decisions:
             if each.kind != "identity" or each.expected_wrong < MIN_EXPECTED:
                 continue
@@ -155,12 +152,9 @@ class Corrector:
             of_marker = own[markers == marker]
             middle = int(of_marker[len(of_marker) // 2])
             is_known = pinned & set(own.tolist()) or middle in self.seen
-            if main[marker] != each.track and len(of_marker) > best and not is_known:
-                best, found = len(of_marker), middle
-        if found < 0:
-            return False
-        self.seen.add(found)
-        return self.say(found)
+            if main[marker] != each.track and len(of_marker) > most and not is_known:
+                most, found = len(of_marker), [middle]
+        return found
 
     def reassign(self, limit: int) -> bool:
         """Look at an assignment of all uncertain detections, and confirm it where it helps.
@@ -179,7 +173,7 @@ class Corrector:
         np.add.at(gains, group[change.stretch_of], is_right)
         without = np.flatnonzero(gains <= -WORTH)
         gain, n = gains.sum() - gains[without].sum(), 1 + len(without)
-        if gain < max(WORTH, self.longest()[0] // SHARE) * n or self.actions + n > limit:
+        if gain < max(WORTH, self.longest()[0][0] // SHARE) * n or self.actions + n > limit:
             return False
         self.edit("reassign", *change.of_groups(without.tolist()).tolist())
         self.actions += n
@@ -191,8 +185,8 @@ class Corrector:
         frame = self.d.frame_of[own]
         return own[(frame >= each.first) & (frame <= each.last)]
 
-    def longest(self) -> tuple[int, int]:
-        """Return the length and the middle of the longest stretch that is not on its track."""
+    def longest(self) -> list[tuple[int, int]]:
+        """Return lengths and middles of the stretches that are not on their tracks, falling."""
         labels, truth = self.labels, self.truth.labels
         wanted = np.append(self.mains(), -1)[truth]
         order = np.lexsort((self.d.frame_of, labels, truth))
@@ -202,35 +196,36 @@ class Corrector:
         known = {*self.seen, *self.stated.values()}
         runs = [run[~np.isin(run, list(known))] for run in np.split(order, edges)]
         left = [(len(run), -int(run[len(run) // 2])) for run in runs if len(run)]
-        n, i = max(left, default=(0, 1))
-        return n, -i
+        return [(n, -i) for n, i in sorted(left, reverse=True)]
 
-    def search(self) -> bool:
-        """State the marker of the longest stretch that is not on the track of its marker."""
-        n, middle = self.longest()
-        if not n:
-            return False
-        self.seen.add(middle)
-        return self.say(middle)
-
-    def say(self, detection: int) -> bool:
-        """State of which marker a detection is, and undo it if more becomes wrong than right."""
-        stated = dict(self.stated)
-        change = self.state(detection)
-        if change is not None:
-            wanted = np.append(self.mains(), -1)[self.truth.labels[change.detections]]
-            is_worse = (change.before == wanted).sum() > (change.after == wanted).sum()
-            if is_worse and self.undoes:
-                self.correction.undo()
-                self.stated = stated
+    def say(self) -> bool:
+        """Make the statement whose preview is best, of those about the largest errors."""
+        best, found = idf1(self.labels, self.truth), None
+        places = dict.fromkeys([*self.offered(), *(i for _, i in self.longest()[:PREVIEWS])])
+        for detection in places:
+            stated = dict(self.stated)
+            for edit in self.statements(detection):
+                self.looks += 1
+                if self.edit(*edit) is not None:
+                    score = idf1(self.labels, self.truth)
+                    self.correction.undo()
+                    if score > best:
+                        best, found = score, (edit, dict(self.stated))
+            self.stated = stated
+        if found is None:
+            self.seen |= places.keys()
+            return bool(places)
+        self.actions += 1
+        edit, self.stated = found
+        self.seen.add(edit[-1])
+        self.edit(*edit)
         return True
 
-    def state(self, detection: int) -> Change | None:
-        """State of which marker a detection is."""
-        self.actions += 1
+    def statements(self, detection: int) -> list[tuple[Any, ...]]:
+        """Return the edits that state of which marker a detection is."""
         marker, labels = int(self.truth.labels[detection]), self.labels
         if marker < 0:
-            return self.edit("clutter", detection)
+            return [("clutter", detection)]
         if marker not in self.stated:
             own = np.flatnonzero(
                 (self.truth.labels == marker) & (labels == self.mains()[marker]) & (labels >= 0)
@@ -240,9 +235,9 @@ class Corrector:
             self.stated[marker] = self.correction.anchor(own) if len(own) else detection
             if not len(own):  # it has no track
                 if labels[detection] >= 0 and len(others):
-                    return self.edit("different", self.correction.anchor(others), detection)
-                return self.edit("name", detection)
-        return self.edit("same", self.stated[marker], detection)
+                    return [("different", self.correction.anchor(others), detection)]
+                return [("name", detection)]
+        return [(kind, self.stated[marker], detection) for kind in ("same", "only")]
 
     def edit(self, kind: EditKind, *detections: int) -> Change | None:
         """Apply an edit, and measure how long that takes."""

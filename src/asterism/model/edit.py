@@ -10,7 +10,9 @@ from asterism.records import record
 
 __all__ = ["Edit", "EditKind"]
 
-EditKind = Literal["same", "different", "cut", "clutter", "name", "fill", "no_fill", "reassign"]
+EditKind = Literal[
+    "same", "only", "different", "cut", "clutter", "name", "fill", "no_fill", "reassign"
+]
 
 N_DETECTIONS = {"clutter": 1, "name": 1, "reassign": None}
 """Number of detections of an edit, where it is not two; None for any number."""
@@ -22,8 +24,9 @@ class Edit:
 
     Parameters
     ----------
-    kind : {"same", "different", "cut", "clutter", "name", "fill", "no_fill", "reassign"}
-        ``same``: both detections are of one marker. ``different``: they are not. ``cut``: they
+    kind : {"same", "only", "different", "cut", "clutter", "name", "fill", "no_fill", "reassign"}
+        ``same``: both detections are of one marker. ``only``: they are, and no other detection but
+        the second goes to the track of the first. ``different``: they are not. ``cut``: they
         follow each other in a track and are not of one marker, and the track is parted exactly
         there. ``clutter``: the detection is a false alarm. ``name``: it is of the marker `name`.
         ``fill``, ``no_fill``: the gap between both detections is filled, or is left open.

@@ -141,7 +141,7 @@ class Constraints:
             If it contradicts an earlier edit.
         """
         own = detections_of(edit, self.detections)
-        if edit.kind == "same":
+        if edit.kind in ("same", "only"):
             self._join(own[0], own[1], edit)
         elif edit.kind in ("different", "cut"):
             self._part(own[0], own[1], edit)

@@ -96,6 +96,8 @@ class Solver:
         own = detections_of(edit, self._d)
         if edit.kind == "same":
             self._join(own)
+        elif edit.kind == "only":
+            self._move(*own)
         elif edit.kind in ("different", "cut"):
             self._part(own, is_here=edit.kind == "cut")
         elif edit.kind == "clutter":
@@ -126,9 +128,23 @@ class Solver:
             if self.names[b] is not None:
                 self.names[a], self.names[b] = self.names[b], None
             return
-        self._carry_out(
-            self._solve(own[1], b, a, beside=own[0]), self._solve(own[0], a, b, beside=own[1])
+        ways = [(own[1], b, a, own[0]), (own[0], a, b, own[1])]
+        is_stated = [i in self._constraints.pinned for i in own]
+        if is_stated[0] != is_stated[1]:  # what was stated stays
+            ways = [ways[is_stated[1]]]
+        self._carry_out(*(self._solve(*each[:3], beside=each[3]) for each in ways))
+
+    def _move(self, one: int, other: int) -> None:
+        """Bring one detection to the track of another, in exchange for that in its frame."""
+        labels, track = self.labels, int(self.labels[one])
+        if track < 0:
+            labels[one] = track = self._new_track()
+        there = np.flatnonzero(
+            (labels == track) & (self._d.frame_of == self._d.frame_of[other])
         )
+        if not self._may_be(other, track) or self._constraints.pinned & set(there.tolist()):
+            raise NoSolution
+        labels[there], labels[other] = labels[other], track
 
     def _may_be_one(self, one: int, other: int) -> bool:
         """Return whether the tracks of two detections may be of one marker as a whole.
