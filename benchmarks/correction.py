@@ -237,7 +237,13 @@ class Corrector:
                 if labels[detection] >= 0 and len(others):
                     return [("different", self.correction.anchor(others), detection)]
                 return [("name", detection)]
-        return [(kind, self.stated[marker], detection) for kind in ("same", "only")]
+        own = np.flatnonzero(labels == labels[detection]) if labels[detection] >= 0 else [detection]
+        is_of = np.concatenate([[False], self.truth.labels[own] == marker, [False]])
+        ends, at = np.flatnonzero(~is_of), np.searchsorted(own, detection) + 1
+        last = np.searchsorted(ends, at)
+        run = own[ends[last - 1]], own[ends[last] - 2]
+        anchor = self.stated[marker]
+        return [("same", anchor, detection), ("only", anchor, *(run if run[0] < run[1] else run[:1]))]
 
     def edit(self, kind: EditKind, *detections: int) -> Change | None:
         """Apply an edit, and measure how long that takes."""

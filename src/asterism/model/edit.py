@@ -14,8 +14,8 @@ EditKind = Literal[
     "same", "only", "different", "cut", "clutter", "name", "fill", "no_fill", "reassign"
 ]
 
-N_DETECTIONS = {"clutter": 1, "name": 1, "reassign": None}
-"""Number of detections of an edit, where it is not two; None for any number."""
+N_DETECTIONS = {"clutter": (1,), "name": (1,), "only": (2, 3), "reassign": None}
+"""Numbers of detections of an edit, where it is not two; None for any number."""
 
 
 @record
@@ -65,14 +65,14 @@ class Edit:
     def __post_init__(self) -> None:
         if self.kind not in get_args(EditKind):
             raise ParameterError("kind", " or ".join(get_args(EditKind)), repr(self.kind))
-        n = N_DETECTIONS.get(self.kind, 2)
+        n = N_DETECTIONS.get(self.kind, (2,))
         at = tuple((frame, point) for frame, point in self.at)
-        if n is not None and len(at) != n:
-            expected = f"{n} detection{'s' * (n != 1)} for {self.kind!r}"
+        if n is not None and len(at) not in n:
+            expected = f"{' or '.join(map(str, n))} detection{'s' * (n != (1,))} for {self.kind!r}"
             raise ParameterError("at", expected, f"{len(at)}")
         for number in (number for each in at for number in each):
             check_number("at", number, above=0, closed=True, integer=True)
-        if n == 2 and at[0][0] == at[1][0] and self.kind != "different":
+        if n == (2,) and at[0][0] == at[1][0] and self.kind != "different":
             raise ParameterError("at", "detections of two frames", f"two of frame {at[0][0]}")
         if (self.kind == "name") != bool(self.name):
             expected = "the name of a marker" if self.kind == "name" else f"none for {self.kind!r}"

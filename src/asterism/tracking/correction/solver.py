@@ -41,6 +41,8 @@ CLUTTER = -2
 """Label, while an edit is solved, of the detections without a track that one of them begins."""
 TRACKED = 3.0
 """Log odds of a detection that continues a track being of its marker instead of clutter."""
+PASSES = 4
+"""Largest number of times that uncertain detections are found and assigned for one edit."""
 MAX_SHARED = 0.1
 """Largest share of the frames of a track that a track of the same marker may have too."""
 
@@ -97,7 +99,7 @@ class Solver:
         if edit.kind == "same":
             self._join(own)
         elif edit.kind == "only":
-            self._move(*own)
+            self._move(own[0], own[1], own[-1])
         elif edit.kind in ("different", "cut"):
             self._part(own, is_here=edit.kind == "cut")
         elif edit.kind == "clutter":
@@ -105,7 +107,12 @@ class Solver:
         elif edit.kind == "name":
             self._call(own[0], edit.name)
         elif edit.kind == "reassign":
-            self._reassign(own)
+            before = None
+            for _ in range(PASSES):
+                if before is not None and np.array_equal(before, self.labels):
+                    break
+                before = self.labels
+                self._reassign(own)
         if edit.kind in ("same", "name"):
             self._collect(int(self.labels[own[0]]))
 
@@ -134,17 +141,19 @@ class Solver:
             ways = [ways[is_stated[1]]]
         self._carry_out(*(self._solve(*each[:3], beside=each[3]) for each in ways))
 
-    def _move(self, one: int, other: int) -> None:
-        """Bring one detection to the track of another, in exchange for that in its frame."""
-        labels, track = self.labels, int(self.labels[one])
-        if track < 0:
-            labels[one] = track = self._new_track()
-        there = np.flatnonzero(
-            (labels == track) & (self._d.frame_of == self._d.frame_of[other])
-        )
-        if not self._may_be(other, track) or self._constraints.pinned & set(there.tolist()):
+    def _move(self, one: int, first: int, last: int) -> None:
+        """Bring the detections of a track from one to another to a third one's, in exchange."""
+        labels, frame = self.labels, self._d.frame_of
+        source, target = int(labels[first]), int(labels[one])
+        if target < 0:
+            labels[one] = target = self._new_track()
+        inside = (frame >= frame[first]) & (frame <= frame[last])
+        moved = np.flatnonzero(inside & (labels == source)) if source >= 0 else [first, last]
+        there = np.flatnonzero(inside & (labels == target) & np.isin(frame, frame[moved]))
+        stated = self._constraints.pinned
+        if stated & {*there.tolist()} or not all(self._may_be(i, target) for i in moved):
             raise NoSolution
-        labels[there], labels[other] = labels[other], track
+        labels[there], labels[moved] = source, target
 
     def _may_be_one(self, one: int, other: int) -> bool:
         """Return whether the tracks of two detections may be of one marker as a whole.
