@@ -46,6 +46,8 @@ from identity import CONDITIONS
 from report import conditions, publish, table
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from asterism.model import Decision
@@ -86,6 +88,11 @@ NEAR = 25
 """Frames between detections of one stretch at most."""
 
 
+def n_actions(edit: Sequence[Any]) -> int:
+    """Return the number of actions of an edit: two for one with a first and a last detection."""
+    return max(len(edit) - 2, 1)
+
+
 class Corrector:
     """A person who knows the truth and says of one detection after the other what it is."""
 
@@ -119,7 +126,7 @@ class Corrector:
     def run(self, goal: float, limit: int) -> None:
         """Act until the IDF1 is at the goal, nothing is left to do, or the limit is reached."""
         while self.actions < limit and idf1(self.labels, self.truth) < goal:
-            if not (self.part() or self.reassign(limit) or self.say()):
+            if not (self.part() or self.reassign(limit) or self.say(limit)):
                 return
 
     def part(self) -> bool:
@@ -198,25 +205,25 @@ class Corrector:
         left = [(len(run), -int(run[len(run) // 2])) for run in runs if len(run)]
         return [(n, -i) for n, i in sorted(left, reverse=True)]
 
-    def say(self) -> bool:
-        """Make the statement whose preview is best, of those about the largest errors."""
-        best, found = idf1(self.labels, self.truth), None
+    def say(self, limit: int) -> bool:
+        """Make the statement that gains most an action, of those about the largest errors."""
+        before, best, found = idf1(self.labels, self.truth), 0.0, None
         places = dict.fromkeys([*self.offered(), *(i for _, i in self.longest()[:PREVIEWS])])
         for detection in places:
             stated = dict(self.stated)
             for edit in self.statements(detection):
                 self.looks += 1
-                if self.edit(*edit) is not None:
-                    score = idf1(self.labels, self.truth)
+                if self.actions + n_actions(edit) <= limit and self.edit(*edit) is not None:
+                    gain = (idf1(self.labels, self.truth) - before) / n_actions(edit)
                     self.correction.undo()
-                    if score > best:
-                        best, found = score, (edit, dict(self.stated))
+                    if gain > best:
+                        best, found = gain, (edit, dict(self.stated))
             self.stated = stated
         if found is None:
             self.seen |= places.keys()
             return bool(places)
-        self.actions += 1
         edit, self.stated = found
+        self.actions += n_actions(edit)
         self.seen.add(edit[-1])
         self.edit(*edit)
         return True

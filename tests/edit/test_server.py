@@ -87,6 +87,20 @@ def test_changes_that_are_left_out_stay_out_of_later_assignments(by_method):
     assert not set(kept) & set(answer["detections"])
 
 
+def test_an_edit_and_an_answer_are_previewed_without_being_made(served):
+    capture, path = am.read(served.folder / CAPTURE), served.folder / "trial.edits.toml"
+    _, message = same(served)
+    choice = {"assessment": 0, "decision": 0, "alternative": 0}
+    for action, values in (("edit", message), ("choose", choice)):
+        status, preview = served.post(f"preview_{action}", **values)
+        assert status == 200
+        assert not path.exists() or not am.io.read_edits(path, capture)
+        _, answer = served.post(action, **values)
+        assert answer["stretches"] == preview["stretches"]
+        served.post("undo")
+    assert served.post("preview_edit", kind="reassign", detections=[0], name="")[0] != 200
+
+
 def test_contradictions_are_refused_and_change_nothing(served):
     _, message = same(served)
     assert served.post("edit", **message)[0] == 200

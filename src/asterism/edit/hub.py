@@ -95,6 +95,8 @@ class Hub:
             return await self._preview(message)
         if action == "preview_reassign":
             return await self._preview_reassign()
+        if action in ("preview_edit", "preview_choose"):
+            return await self._preview_edit(action.removeprefix("preview_"), message)
         if action == "save":
             return await self._save()
         async with self._lock:
@@ -185,6 +187,12 @@ class Hub:
             "track": track, "first": first + self.view.shift, "last": last + self.view.shift,
             "points": np.round(points, 5).tolist(), "sigma": np.round(sigma, 6).tolist(),
         }  # fmt: skip
+
+    async def _preview_edit(self, action: str, message: Message) -> dict[str, Any]:
+        async with self._lock:
+            edit = self._edit(action, message)
+            change = await asyncio.to_thread(self.session.preview, edit)
+        return {"stretches": self.view.stretches(change)}
 
     async def _preview_reassign(self) -> dict[str, Any]:
         async with self._lock:

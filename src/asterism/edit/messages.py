@@ -18,6 +18,8 @@ _FIELDS: dict[str, dict[str, str]] = {
     "fill": {"kind": _TEXT, "track": _NUMBER, "first": _NUMBER, "last": _NUMBER},
     "preview": {"track": _NUMBER, "first": _NUMBER, "last": _NUMBER},
     "preview_reassign": {},
+    "preview_edit": {"kind": _TEXT, "detections": _NUMBERS, "name": _TEXT},
+    "preview_choose": {"assessment": _NUMBER, "decision": _NUMBER, "alternative": _CHOICE},
     "reassign": {"version": _NUMBER, "without": _GROUPS},
     "choose": {"assessment": _NUMBER, "decision": _NUMBER, "alternative": _CHOICE},
     "refuse": {"version": _NUMBER, "stretch": _NUMBER},
@@ -26,12 +28,10 @@ _FIELDS: dict[str, dict[str, str]] = {
     "save": {},
 }
 _FILLS = ("fill", "no_fill")
-_KINDS = {
-    "edit": tuple(kind for kind in get_args(EditKind) if kind not in (*_FILLS, "reassign")),
-    "fill": _FILLS,
-}
+_STATED = tuple(kind for kind in get_args(EditKind) if kind not in (*_FILLS, "reassign"))
+_KINDS = {"edit": _STATED, "preview_edit": _STATED, "fill": _FILLS}
 _MAX_TEXT = 200
-_MAX_DETECTIONS = 2
+_MAX_DETECTIONS = 3
 _MAX_GROUPS = 1000
 
 

@@ -4,7 +4,7 @@ import { byId, counted, frames, make, named } from "./dom.js";
 
 const MAX_LISTED = 5;
 const WORDS = {
-  same: "one marker", different: "different markers", cut: "cut", clutter: "ghost",
+  same: "one marker", only: "one marker, there alone", different: "different markers", cut: "cut", clutter: "ghost",
   name: "name", fill: "filled", no_fill: "left open",
   reassign: "assigned again",
 };

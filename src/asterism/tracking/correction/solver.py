@@ -41,8 +41,6 @@ CLUTTER = -2
 """Label, while an edit is solved, of the detections without a track that one of them begins."""
 TRACKED = 3.0
 """Log odds of a detection that continues a track being of its marker instead of clutter."""
-PASSES = 4
-"""Largest number of times that uncertain detections are found and assigned for one edit."""
 MAX_SHARED = 0.1
 """Largest share of the frames of a track that a track of the same marker may have too."""
 
@@ -107,12 +105,7 @@ class Solver:
         elif edit.kind == "name":
             self._call(own[0], edit.name)
         elif edit.kind == "reassign":
-            before = None
-            for _ in range(PASSES):
-                if before is not None and np.array_equal(before, self.labels):
-                    break
-                before = self.labels
-                self._reassign(own)
+            self._reassign(own)
         if edit.kind in ("same", "name"):
             self._collect(int(self.labels[own[0]]))
 
