@@ -1,19 +1,22 @@
 """Correction of results by a person who knows the truth: how many actions until all is right.
 
-The corrector states the marker where the most detections are wrong: an uncertain identity that the
-editor offers, or a longer stretch. Before each statement it looks at what an assignment of all
-uncertain detections would change. Changes that make at least three detections wrong are left out,
-each of which is an action. It confirms the others, an action too, if each action makes at least
-three detections right, and a quarter of the longest wrong stretch. A statement that makes more
-detections wrong than right is undone, and counts; once no other is left, it is kept. There is one
-action for three wrong links, and 420 at most.
+The corrector chooses among what the editor offers, by previews, which are looks. First it looks at
+the two assignments of all uncertain detections, by `reassign` and at even odds. It leaves out the
+groups that make at least three detections wrong, each of which is an action, and confirms the
+others, an action too, if each action makes at least three detections right, and a quarter of the
+longest wrong stretch. Otherwise it states the marker of a detection: of the uncertain identity with
+the most wrong detections that is offered, or of one of the five longest wrong stretches. Each is
+previewed as `same` and as `only`, and the statement that raises the IDF1 most an action is made.
+An `only` about a first and a last detection counts as two actions. There is one action for three
+wrong links, and 420 at most.
 
 The goal is an IDF1 of 0.999, or that of the oracle where occlusions keep it below. Results that
 reach the goal before any action are counted and not listed.
 
 The same is done by hand, from the first frame on: each wrong link is mended by an exchange of both
 tracks from there on, a join, a cut, or a track for a stretch of detections without one. That is
-counted up to four times as many actions.
+counted up to four times as many actions. Where fewer than four are enough, as for one wrong place,
+the corrector cannot do with a quarter of them: it needs one action too.
 
 Wrong links are those of the result between detections of different markers, and those of the truth
 that the result lacks (`am.evaluate`). Captures of ``../shared/data`` (or ``--data``). Captures
@@ -23,7 +26,7 @@ The second table is the processor time of statements about random detections of 
 with 60 markers, in 10 000 frames with bursts of missed detections and ghosts.
 
     python benchmarks/correction.py [--data FOLDER] [--only NAME] [--condition NAME]
-                                    [--markdown FILE]
+                                    [--seed N] [--markdown FILE]
 """
 
 from __future__ import annotations
@@ -39,10 +42,11 @@ from scipy.optimize import linear_sum_assignment
 import asterism as am
 from asterism.errors import ParameterError
 from asterism.model import Edit
+from asterism.model.edit import REASSIGN
 from asterism.simulate import Burst, Ghosts
 from calibration import tracked
 from captures import captures
-from identity import CONDITIONS
+from identity import CONDITIONS, SEEDED
 from report import conditions, publish, table
 
 if TYPE_CHECKING:
@@ -164,25 +168,31 @@ class Corrector:
         return found
 
     def reassign(self, limit: int) -> bool:
-        """Look at an assignment of all uncertain detections, and confirm it where it helps.
+        """Look at both assignments of all uncertain detections, and confirm one where it helps.
 
         Groups of changes that make at least `WORTH` detections wrong are left out.
         """
-        self.looks += 1
         wanted = np.append(self.mains(), -1)[self.truth.labels]
-        change = self.edit("reassign")
-        if change is None:
+        min_gain, found = max(WORTH, max(n for n, _ in [*self.longest(), (0, 0)]) // SHARE), None
+        for kind in REASSIGN:
+            self.looks += 1
+            change = self.edit(kind)
+            if change is None:
+                continue
+            self.correction.undo()
+            own, group = change.detections, np.array([each.group for each in change.stretches], int)
+            is_right = (change.after == wanted[own]).astype(int) - (change.before == wanted[own])
+            gains = np.zeros(len(group), dtype=int)
+            np.add.at(gains, group[change.stretch_of], is_right)
+            without = np.flatnonzero(gains <= -WORTH)
+            n = 1 + len(without)
+            gain = (gains.sum() - gains[without].sum()) / n
+            if gain >= min_gain and self.actions + n <= limit:
+                min_gain, found = gain, (n, kind, change.of_groups(without.tolist()).tolist())
+        if found is None:
             return False
-        self.correction.undo()
-        own, group = change.detections, np.array([each.group for each in change.stretches], int)
-        is_right = (change.after == wanted[own]).astype(int) - (change.before == wanted[own])
-        gains = np.zeros(len(group), dtype=int)
-        np.add.at(gains, group[change.stretch_of], is_right)
-        without = np.flatnonzero(gains <= -WORTH)
-        gain, n = gains.sum() - gains[without].sum(), 1 + len(without)
-        if gain < max(WORTH, self.longest()[0][0] // SHARE) * n or self.actions + n > limit:
-            return False
-        self.edit("reassign", *change.of_groups(without.tolist()).tolist())
+        n, kind, left_out = found
+        self.edit(kind, *left_out)
         self.actions += n
         return True
 
@@ -248,9 +258,10 @@ class Corrector:
         is_of = np.concatenate([[False], self.truth.labels[own] == marker, [False]])
         ends, at = np.flatnonzero(~is_of), np.searchsorted(own, detection) + 1
         last = np.searchsorted(ends, at)
-        run = own[ends[last - 1]], own[ends[last] - 2]
+        first, end = own[ends[last - 1]], own[ends[last] - 2]
         anchor = self.stated[marker]
-        return [("same", anchor, detection), ("only", anchor, *(run if run[0] < run[1] else run[:1]))]
+        alone = (first, end) if first < end else (first,)
+        return [("same", anchor, detection), ("only", anchor, *alone)]
 
     def edit(self, kind: EditKind, *detections: int) -> Change | None:
         """Apply an edit, and measure how long that takes."""
@@ -264,7 +275,7 @@ class Corrector:
             self.refused += 1
             return None
         finally:
-            if kind != "reassign":
+            if kind not in REASSIGN:
                 self.seconds.append(time.perf_counter() - start)
 
 
@@ -348,12 +359,24 @@ def latency() -> list[list[str]]:
     return rows
 
 
+def sums(rows: list[list[str]]) -> str:
+    """Return the sum of the actions of all listed results, and the largest share of one."""
+    counts = np.array([(int(row[6]), int(row[8])) for row in rows]).reshape(-1, 2)
+    (actions, by_hand), large = counts.sum(axis=0), counts[counts[:, 1] >= SHARE]
+    share = 100 * (large[:, 0] / large[:, 1]).max(initial=0)
+    return (
+        f"{actions} actions in all, {by_hand} by hand. Where at least {SHARE} are needed by hand, "
+        f"at most {share:.0f} % of them; of fewer, one action is more than a quarter."
+    )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     beside = Path(__file__).resolve().parents[2] / "shared" / "data"
     parser.add_argument("--data", type=Path, default=beside)
     parser.add_argument("--only", default="")
     parser.add_argument("--condition", default="")
+    parser.add_argument("--seed", type=int, default=1, help="of the corruption")
     parser.add_argument("--markdown", type=Path)
     args = parser.parse_args()
     rows: list[list[str]] = []
@@ -365,7 +388,7 @@ def main() -> None:
         if not any(recorded.names):
             continue  # unnamed trajectories are pieces of markers, and no truth
         for name, corrupt in CONDITIONS.items():
-            truth = corrupt(recorded)
+            truth = SEEDED[name](recorded, args.seed) if name in SEEDED else corrupt(recorded)
             if args.condition not in name or truth.labels.max(initial=-1) < 0:
                 continue
             made = Corrector(truth)
@@ -394,7 +417,7 @@ def main() -> None:
     times = table(["statement", "median, ms", "99 %, ms"], latency())
     found = table(header, rows)
     right = f"{n_right} more results reach the goal before any action."
-    publish([conditions(), "", *found, "", right, "", *times], args.markdown)
+    publish([conditions(), "", *found, "", sums(rows), "", right, "", *times], args.markdown)
 
 
 if __name__ == "__main__":

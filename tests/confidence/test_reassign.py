@@ -6,7 +6,7 @@ import numpy as np
 
 import asterism as am
 from asterism import _engine
-from asterism.tracking.confidence.reassign import FOR_PERSON, gains, ghost_log_odds, reassigned
+from asterism.tracking.confidence.reassign import EVEN_ODDS, gains, ghost_log_odds, reassigned
 from tests.references.reassignment import Reassignment
 from tests.scenes import moving, sized
 
@@ -74,12 +74,12 @@ def test_two_tracks_that_are_exchanged_over_runs_of_frames_return():
     np.testing.assert_array_equal(found, truth.labels)
 
 
-def test_a_person_is_offered_what_is_more_probable_than_not():
+def test_at_even_odds_what_is_more_probable_than_not_is_taken():
     truth, tracks = body()
     is_open, ghost = tracks.labels != truth.labels, np.where(tracks.labels < 0, 2.0, 0.0)
     noisy = 100 * NOISE  # distances that tell little
     strict = reassigned(tracks, is_open, ghost, noisy)
-    found = reassigned(tracks, is_open, ghost, noisy, FOR_PERSON)
+    found = reassigned(tracks, is_open, ghost, noisy, EVEN_ODDS)
     lost = tracks.labels < 0
     assert (strict[lost] < 0).all()
     np.testing.assert_array_equal(found[lost], truth.labels[lost])

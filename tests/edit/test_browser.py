@@ -329,6 +329,25 @@ def test_an_assignment_of_all_points_is_previewed_and_confirmed(browser, by_meth
     page.close()
 
 
+def test_an_assignment_at_even_odds_changes_more(browser, by_method):
+    page = opened(browser, by_method)
+    n = []
+    for shift in (False, True):
+        page.key("t", shift=shift)
+        page.wait(f"{PREVIEW}.includes('would change')")
+        n.append(n_previewed(page))
+        page.key("Escape")
+        page.wait(f"{PREVIEW} === ''")
+    assert n[0] < n[1]
+    press(page, "#edit-reassign-even")
+    page.wait(f"{PREVIEW}.includes('would change')")
+    page.key("Enter")
+    on_disk(page, 1)
+    assert [each.kind for each in edits_of(by_method)] == ["reassign_even"]
+    assert_same_tracks(page, session_of(by_method, am.GNN()))
+    page.close()
+
+
 def test_changes_of_a_preview_are_left_out_by_keyboard_and_pointer(browser, by_method):
     page = opened(browser, by_method)
     page.key("t")

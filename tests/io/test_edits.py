@@ -15,6 +15,7 @@ EDITS = (
     Edit(kind="only", at=((3, 0), (9, 2), (12, 2))),
     Edit(kind="no_fill", at=((4, 1), (7, 1))),
     Edit(kind="reassign", at=(), who="Ada"),
+    Edit(kind="reassign_even", at=((4, 1),)),
 )
 
 

@@ -11,10 +11,13 @@ from asterism.records import record
 __all__ = ["Edit", "EditKind"]
 
 EditKind = Literal[
-    "same", "only", "different", "cut", "clutter", "name", "fill", "no_fill", "reassign"
-]
+    "same", "only", "different", "cut", "clutter", "name", "fill", "no_fill", "reassign",
+    "reassign_even",
+]  # fmt: skip
+REASSIGN: tuple[EditKind, ...] = ("reassign", "reassign_even")
+"""Kinds that assign all uncertain detections once more."""
 
-N_DETECTIONS = {"clutter": (1,), "name": (1,), "only": (2, 3), "reassign": None}
+N_DETECTIONS = {"clutter": (1,), "name": (1,), "only": (2, 3), **dict.fromkeys(REASSIGN)}
 """Numbers of detections of an edit, where it is not two; None for any number."""
 
 
@@ -24,14 +27,17 @@ class Edit:
 
     Parameters
     ----------
-    kind : {"same", "only", "different", "cut", "clutter", "name", "fill", "no_fill", "reassign"}
-        ``same``: both detections are of one marker. ``only``: they are, and no other detection but
-        the second goes to the track of the first. ``different``: they are not. ``cut``: they
+    kind : {"same", "only", "different", "cut", "clutter", "name", "fill", "no_fill", "reassign",
+        "reassign_even"}
+        ``same``: both detections are of one marker. ``only``: they are, and the second alone goes
+        to the track of the first, in exchange for that in its frame; with a third detection, those
+        of the second's track up to the third do. ``different``: they are not. ``cut``: they
         follow each other in a track and are not of one marker, and the track is parted exactly
         there. ``clutter``: the detection is a false alarm. ``name``: it is of the marker `name`.
         ``fill``, ``no_fill``: the gap between both detections is filled, or is left open.
         ``reassign``: all uncertain detections are assigned once more, given the tracks as the
         earlier edits have corrected them; those of the edit stay, now and in later ones.
+        ``reassign_even``: the same at even odds, for a person who looks at every change.
     at : tuple of (int, int)
         Frame of each detection, counted from 0, and its number among the points of that frame.
     name : str

@@ -66,7 +66,8 @@ class Editor {
       ghost: () => this.correct(() => corrections.ghost()),
       fill: () => this.preview(),
       keep: () => selection.keep(),
-      reassign: () => this.previewAgain(),
+      reassign: () => this.previewAgain(false),
+      "reassign-even": () => this.previewAgain(true),
       lasso: () => this.overlay?.lasso(!this.overlay.isOn),
       undo: () => this.send("undo"),
       redo: () => this.send("redo"),
@@ -76,7 +77,8 @@ class Editor {
     for (const [name, does] of Object.entries(act)) byId(`edit-${name}`).addEventListener("click", does);
     Object.assign(keys, {
       n: () => decisions.step(1), p: () => decisions.step(-1),
-      x: act.swap, j: act.join, v: act["cut-whole"], k: act.ghost, g: act.fill, e: act.keep, t: act.reassign,
+      x: act.swap, j: act.join, v: act["cut-whole"], k: act.ghost, g: act.fill, e: act.keep,
+      t: (event) => act[event.shiftKey ? "reassign-even" : "reassign"](),
       h: (event) => (event.shiftKey ? act.mark : act.here)(), q: act.ahead,
       c: (event) => (event.shiftKey ? act["cut-back"] : act.cut)(),
       o: act.lasso, u: () => selection.stepPoint(), i: () => this.naming.begin(),
@@ -255,10 +257,10 @@ class Editor {
     this.stage?.redraw();
   }
 
-  /** Show what an assignment of all uncertain points, given what was stated, would change. */
-  async previewAgain() {
+  /** Show what an assignment of all uncertain points, perhaps at even odds, would change. */
+  async previewAgain(is_even) {
     this.preview(null);
-    const answer = await this.send("preview_reassign");
+    const answer = await this.send("preview_reassign", { is_even });
     if (!answer) return;
     const { stretches, version } = answer;
     if (!stretches.length) {
@@ -311,7 +313,7 @@ class Editor {
   }
 
   withoutServer() {
-    for (const name of ["fill", "redo", "reassign", "ahead"]) byId(`edit-${name}`).hidden = true;
+    for (const name of ["fill", "redo", "reassign", "reassign-even", "ahead"]) byId(`edit-${name}`).hidden = true;
     byId("edit-save").firstChild.textContent = "Download edits";
     byId("decision").hidden = true;
     byId("uncertain-tile").hidden = true;

@@ -35,13 +35,13 @@ _KEYS = {
     "G": "preview the fill of the gap at this frame",
     "Q": "preview each answer and correction before it is made",
     "Enter": "confirm the preview",
-    "T": "preview an assignment of all uncertain points, given what was stated",
+    "T, Shift T": "preview an assignment of all uncertain points; the same at even odds",
     "Z, Y": "undo, redo",
     "R": "take back the first of the other changes",
     "B": "save",
     "?": "list of keys",
 }
-_SERVED = ("1 … 9", "G", "Q", "Enter", "T", "Z, Y", "R", "B")
+_SERVED = ("1 … 9", "G", "Q", "Enter", "T, Shift T", "Z, Y", "R", "B")
 
 
 def editing_of(detections: Detections, file: str) -> Editing:
@@ -121,7 +121,7 @@ PANEL = element(
         element(
             "div",
             _button("edit-swap", "Exchange", "X", "Exchange two tracks from this frame on"),
-            _button("edit-here", "Exchange here", "H", "Exchange in this frame, or from the mark on"),
+            _button("edit-here", "Exchange here", "H", "Exchange in this frame or from the mark"),
             _button("edit-mark", "Mark", "⇧H", "Mark the frame from which an exchange begins"),
             _button("edit-join", "Join", "J", "Join two tracks"),
             _button("edit-ghost", "Ghost", "K", "Delete the part: it is a ghost"),
@@ -131,6 +131,7 @@ PANEL = element(
             _button("edit-fill", "Fill gap", "G", "Preview the fill of the gap at this frame"),
             _button("edit-ahead", "Preview first", "Q", "Preview edits before they are made"),
             _button("edit-reassign", "Assign again", "T", "Preview an assignment of all points"),
+            _button("edit-reassign-even", "At even odds", "⇧T", "Preview it at even odds"),
             _button("edit-keep", "Add", "E", "Keep the track and select a second one"),
             _button("edit-lasso", "Lasso", "O", "Draw around markers to select them"),
             class_="tools",

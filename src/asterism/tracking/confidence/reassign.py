@@ -18,7 +18,15 @@ if TYPE_CHECKING:
     from asterism.model import Tracks
     from asterism.tracking.stitching import Stitching
 
-__all__ = ["FOR_PERSON", "PROBABLE", "UNCERTAIN", "gains", "ghost_log_odds", "reassigned"]
+__all__ = [
+    "EVEN_ODDS",
+    "PROBABLE",
+    "ROUNDS",
+    "UNCERTAIN",
+    "gains",
+    "ghost_log_odds",
+    "reassigned",
+]
 
 UNCERTAIN = 0.8
 """Confidence of an identity below which a correction assigns a detection again."""
@@ -28,9 +36,9 @@ CHANGE = 0.2
 """Log odds that a change must gain, so that labels of equal odds do not alternate."""
 ROUNDS = (PROBABLE,) * 3
 """Log odds of each time that all frames are assigned, with the distances learnt anew."""
-FOR_PERSON = (-PROBABLE, 0.0, 0.0)
-"""The same where a person confirms the result. The first round finds runs of detections that
-support each other, of which no single one is probable."""
+EVEN_ODDS = (-PROBABLE, 0.0, 0.0)
+"""The same at even odds, where a person confirms the result. The first round finds runs of
+detections that support each other, of which no single one is probable."""
 REACH = 8
 """Number of frames before and after a detection by which its motion is predicted."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from asterism.errors import ParameterError
+from asterism.model.edit import REASSIGN
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -151,7 +152,7 @@ class Constraints:
             if own[0] in self._root:
                 self._refuse(edit, self._about(own[0]))
             self._clutter[own[0]] = edit
-        elif edit.kind == "reassign":
+        elif edit.kind in REASSIGN:
             self._kept.update(own)
         self.edits += (edit,)
 

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.model import Tracks
+from asterism.model.edit import REASSIGN
 from asterism.tracking.confidence.identity import assess
 from asterism.tracking.confidence.reassign import (
-    FOR_PERSON,
+    EVEN_ODDS,
     PROBABLE,
+    ROUNDS,
     UNCERTAIN,
     gains,
     reassigned,
@@ -104,8 +106,8 @@ class Solver:
             self._drop(own[0])
         elif edit.kind == "name":
             self._call(own[0], edit.name)
-        elif edit.kind == "reassign":
-            self._reassign(own)
+        elif edit.kind in REASSIGN:
+            self._reassign(own, is_even=edit.kind == "reassign_even")
         if edit.kind in ("same", "name"):
             self._collect(int(self.labels[own[0]]))
 
@@ -141,10 +143,15 @@ class Solver:
         if target < 0:
             labels[one] = target = self._new_track()
         inside = (frame >= frame[first]) & (frame <= frame[last])
-        moved = np.flatnonzero(inside & (labels == source)) if source >= 0 else [first, last]
+        moved = [first, last]
+        if source >= 0:
+            moved = np.flatnonzero(inside & (labels == source)).tolist()
         there = np.flatnonzero(inside & (labels == target) & np.isin(frame, frame[moved]))
-        stated = self._constraints.pinned
-        if stated & {*there.tolist()} or not all(self._may_be(i, target) for i in moved):
+        if (
+            not {first, last} <= set(moved)
+            or self._constraints.pinned & set(there.tolist())
+            or not all(self._may_be(i, target) for i in moved)
+        ):
             raise NoSolution
         labels[there], labels[moved] = source, target
 
@@ -374,8 +381,11 @@ class Solver:
         _, first = np.unique(frame[others], return_index=True)  # the most probable of each frame
         labels[others[first]] = track
 
-    def _reassign(self, kept: Sequence[int]) -> None:
-        """Assign the uncertain detections and those without a track once more, without some."""
+    def _reassign(self, kept: Sequence[int], *, is_even: bool) -> None:
+        """Assign the uncertain detections and those without a track once more, without some.
+
+        With even odds, changes that depend on each other are made if they gain together.
+        """
         tracks = Tracks(detections=self._d, labels=self.labels, names=tuple(self.names))
         assessed = settled(
             assess(tracks, self._model, self._stitching), self._constraints.edits
@@ -386,15 +396,18 @@ class Solver:
         labels, is_placed = with_lost_segments(tracks, is_open)
         ghost, noise_sigma = self.evidence.ghost, self._model.sensor.noise_sigma
         placed = replace(tracks, labels=labels)
-        labels = reassigned(placed, is_open & ~is_placed, ghost, noise_sigma, FOR_PERSON)
+        rounds = EVEN_ODDS if is_even else ROUNDS
+        labels = reassigned(placed, is_open & ~is_placed, ghost, noise_sigma, rounds)
         # Without distances at its best, a marker is no clutter: its identity must be improbable.
         slots = self._d.frame_of * len(self.names)
         is_back = (self.labels >= 0) & (labels < 0) & (assessed > 1 - UNCERTAIN)
         is_back &= ~np.isin(slots + self.labels, (slots + labels)[labels >= 0])
         labels = np.where(is_back, self.labels, labels)
-        odds = gains(tracks, labels, ghost, noise_sigma)
-        odds[is_placed] = PROBABLE  # at least, by the distances among them
-        self.labels = without_improbable(self.labels, labels, odds, self._d.frame_of)
+        if is_even:
+            odds = gains(tracks, labels, ghost, noise_sigma)
+            odds[is_placed] = PROBABLE  # at least, by the distances among them
+            labels = without_improbable(self.labels, labels, odds, self._d.frame_of)
+        self.labels = labels
 
     def _free(self) -> NDArray[np.bool_]:
         """Return which detections have no track, without those that an edit is about.
