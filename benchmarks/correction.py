@@ -173,7 +173,8 @@ class Corrector:
         Groups of changes that make at least `WORTH` detections wrong are left out.
         """
         wanted = np.append(self.mains(), -1)[self.truth.labels]
-        min_gain, found = max(WORTH, max(n for n, _ in [*self.longest(), (0, 0)]) // SHARE), None
+        min_gain = max(WORTH, max(n for n, _ in [*self.longest(), (0, 0)]) // SHARE)
+        found: tuple[int, EditKind, list[int]] | None = None
         for kind in REASSIGN:
             self.looks += 1
             change = self.edit(kind)
@@ -188,7 +189,8 @@ class Corrector:
             n = 1 + len(without)
             gain = (gains.sum() - gains[without].sum()) / n
             if gain >= min_gain and self.actions + n <= limit:
-                min_gain, found = gain, (n, kind, change.of_groups(without.tolist()).tolist())
+                found = n, kind, change.of_groups(without.tolist()).tolist()
+                min_gain = gain
         if found is None:
             return False
         n, kind, left_out = found

@@ -164,7 +164,7 @@ def test_clutter_deletes_a_part_and_same_brings_it_back(walk):
 
 def random_edit(rng, tracks):
     d, labels = tracks.detections, tracks.labels
-    kind = str(rng.choice(["same", "same", "same", "different", "cut", "clutter", "name"]))
+    kind = str(rng.choice(["same", "same", "same", "only", "different", "cut", "clutter", "name"]))
     i, j = rng.choice(len(labels), 2, replace=False)
     if kind == "cut":
         own = np.flatnonzero(labels == labels[i])
@@ -181,7 +181,7 @@ def random_edit(rng, tracks):
 def holds(edit, tracks):
     own = detections_of(edit, tracks.detections)
     labels = tracks.labels[list(own)]
-    if edit.kind == "same":
+    if edit.kind in ("same", "only"):
         return labels[0] == labels[1] >= 0
     if edit.kind in ("different", "cut"):
         return labels[0] != labels[1] or labels[0] < 0

@@ -147,9 +147,11 @@ class Solver:
         if source >= 0:
             moved = np.flatnonzero(inside & (labels == source)).tolist()
         there = np.flatnonzero(inside & (labels == target) & np.isin(frame, frame[moved]))
+        stated = self._constraints
         if (
             not {first, last} <= set(moved)
-            or self._constraints.pinned & set(there.tolist())
+            or stated.pinned & set(there.tolist())
+            or not all(stated.group(i) <= {*moved, *stated.group(one)} for i in moved)
             or not all(self._may_be(i, target) for i in moved)
         ):
             raise NoSolution
