@@ -339,7 +339,7 @@ def test_an_assignment_at_even_odds_changes_more(browser, by_method):
         page.key("Escape")
         page.wait(f"{PREVIEW} === ''")
     assert n[0] < n[1]
-    press(page, "#edit-reassign-even")
+    page.run("document.getElementById('edit-reassign-even').click()")
     page.wait(f"{PREVIEW}.includes('would change')")
     page.key("Enter")
     on_disk(page, 1)
