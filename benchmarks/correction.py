@@ -1,19 +1,22 @@
 """Correction of results by a person who knows the truth: how many actions until all is right.
 
-The corrector states the marker where the most detections are wrong: an uncertain identity that the
-editor offers, or a longer stretch. Before each statement it looks at what an assignment of all
-uncertain detections would change. Changes that make at least three detections wrong are left out,
-each of which is an action. It confirms the others, an action too, if each action makes at least
-three detections right, and a quarter of the longest wrong stretch. A statement that makes more
-detections wrong than right is undone, and counts; once no other is left, it is kept. There is one
-action for three wrong links, and 420 at most.
+The corrector chooses among what the editor offers, by previews, which are looks. First it looks at
+the two assignments of all uncertain detections, by `reassign` and at even odds. It leaves out the
+groups that make at least three detections wrong, each of which is an action, and confirms the
+others, an action too, if each action makes at least three detections right, and a quarter of the
+longest wrong stretch. Otherwise it states the marker of a detection: of the uncertain identity with
+the most wrong detections that is offered, or of one of the five longest wrong stretches. Each is
+previewed as `same` and as `only`, and the statement that raises the IDF1 most an action is made.
+An `only` about a first and a last detection counts as two actions. There is one action for three
+wrong links, and 420 at most.
 
 The goal is an IDF1 of 0.999, or that of the oracle where occlusions keep it below. Results that
 reach the goal before any action are counted and not listed.
 
 The same is done by hand, from the first frame on: each wrong link is mended by an exchange of both
 tracks from there on, a join, a cut, or a track for a stretch of detections without one. That is
-counted up to four times as many actions.
+counted up to four times as many actions. Where fewer than four are enough, as for one wrong place,
+the corrector cannot do with a quarter of them: it needs one action too.
 
 Wrong links are those of the result between detections of different markers, and those of the truth
 that the result lacks (`am.evaluate`). Captures of ``../shared/data`` (or ``--data``). Captures
@@ -23,7 +26,7 @@ The second table is the processor time of statements about random detections of 
 with 60 markers, in 10 000 frames with bursts of missed detections and ghosts.
 
     python benchmarks/correction.py [--data FOLDER] [--only NAME] [--condition NAME]
-                                    [--markdown FILE]
+                                    [--seed N] [--markdown FILE]
 """
 
 from __future__ import annotations
@@ -31,7 +34,7 @@ from __future__ import annotations
 import argparse
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -39,13 +42,16 @@ from scipy.optimize import linear_sum_assignment
 import asterism as am
 from asterism.errors import ParameterError
 from asterism.model import Edit
+from asterism.model.edit import REASSIGN
 from asterism.simulate import Burst, Ghosts
 from calibration import tracked
 from captures import captures
-from identity import CONDITIONS
+from identity import CONDITIONS, SEEDED
 from report import conditions, publish, table
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from asterism.model import Decision
@@ -80,8 +86,15 @@ WORTH = 3
 """Number of detections that an action must mend where an assignment is confirmed."""
 SHARE = 4
 """Of the longest wrong stretch, the divisor of the number of detections that it must mend too."""
+PREVIEWS = 5
+"""Number of stretches of which statements are previewed before one is made."""
 NEAR = 25
 """Frames between detections of one stretch at most."""
+
+
+def n_actions(edit: Sequence[Any]) -> int:
+    """Return the number of actions of an edit: two for one with a first and a last detection."""
+    return max(len(edit) - 2, 1)
 
 
 class Corrector:
@@ -96,7 +109,6 @@ class Corrector:
         self.seen: set[int] = set()
         self.looked: set[tuple[int, int, int]] = set()
         self.actions = self.looks = self.refused = 0
-        self.undoes = True
         self.seconds: list[float] = []
 
     @property
@@ -118,12 +130,8 @@ class Corrector:
     def run(self, goal: float, limit: int) -> None:
         """Act until the IDF1 is at the goal, nothing is left to do, or the limit is reached."""
         while self.actions < limit and idf1(self.labels, self.truth) < goal:
-            if self.part() or self.reassign(limit) or self.choose() or self.search():
-                continue
-            if not self.undoes:
+            if not (self.part() or self.reassign(limit) or self.say(limit)):
                 return
-            self.undoes = False
-            self.seen.clear()
 
     def part(self) -> bool:
         """State that two stated markers, which are on one track, are different."""
@@ -137,12 +145,12 @@ class Corrector:
                 return True
         return False
 
-    def choose(self) -> bool:
-        """Answer the offered identity that has the most wrong detections."""
+    def offered(self) -> list[int]:
+        """Return a detection of the offered identity that has the most wrong detections."""
         tracks = am.tracking.assess(self.correction.tracks, self.model, self.stitching)
         pinned = self.correction.constraints.pinned
         main = np.append(self.mains(), -1)
-        best, found = self.longest()[0] - 1, -1
+        most, found = 0, []
         for each in tracks.decisions:
             if each.kind != "identity" or each.expected_wrong < MIN_EXPECTED:
                 continue
@@ -155,33 +163,38 @@ class Corrector:
             of_marker = own[markers == marker]
             middle = int(of_marker[len(of_marker) // 2])
             is_known = pinned & set(own.tolist()) or middle in self.seen
-            if main[marker] != each.track and len(of_marker) > best and not is_known:
-                best, found = len(of_marker), middle
-        if found < 0:
-            return False
-        self.seen.add(found)
-        return self.say(found)
+            if main[marker] != each.track and len(of_marker) > most and not is_known:
+                most, found = len(of_marker), [middle]
+        return found
 
     def reassign(self, limit: int) -> bool:
-        """Look at an assignment of all uncertain detections, and confirm it where it helps.
+        """Look at both assignments of all uncertain detections, and confirm one where it helps.
 
         Groups of changes that make at least `WORTH` detections wrong are left out.
         """
-        self.looks += 1
         wanted = np.append(self.mains(), -1)[self.truth.labels]
-        change = self.edit("reassign")
-        if change is None:
+        min_gain = max(WORTH, max(n for n, _ in [*self.longest(), (0, 0)]) // SHARE)
+        found: tuple[int, EditKind, list[int]] | None = None
+        for kind in REASSIGN:
+            self.looks += 1
+            change = self.edit(kind)
+            if change is None:
+                continue
+            self.correction.undo()
+            own, group = change.detections, np.array([each.group for each in change.stretches], int)
+            is_right = (change.after == wanted[own]).astype(int) - (change.before == wanted[own])
+            gains = np.zeros(len(group), dtype=int)
+            np.add.at(gains, group[change.stretch_of], is_right)
+            without = np.flatnonzero(gains <= -WORTH)
+            n = 1 + len(without)
+            gain = (gains.sum() - gains[without].sum()) / n
+            if gain >= min_gain and self.actions + n <= limit:
+                found = n, kind, change.of_groups(without.tolist()).tolist()
+                min_gain = gain
+        if found is None:
             return False
-        self.correction.undo()
-        own, group = change.detections, np.array([each.group for each in change.stretches], int)
-        is_right = (change.after == wanted[own]).astype(int) - (change.before == wanted[own])
-        gains = np.zeros(len(group), dtype=int)
-        np.add.at(gains, group[change.stretch_of], is_right)
-        without = np.flatnonzero(gains <= -WORTH)
-        gain, n = gains.sum() - gains[without].sum(), 1 + len(without)
-        if gain < max(WORTH, self.longest()[0] // SHARE) * n or self.actions + n > limit:
-            return False
-        self.edit("reassign", *change.of_groups(without.tolist()).tolist())
+        n, kind, left_out = found
+        self.edit(kind, *left_out)
         self.actions += n
         return True
 
@@ -191,8 +204,8 @@ class Corrector:
         frame = self.d.frame_of[own]
         return own[(frame >= each.first) & (frame <= each.last)]
 
-    def longest(self) -> tuple[int, int]:
-        """Return the length and the middle of the longest stretch that is not on its track."""
+    def longest(self) -> list[tuple[int, int]]:
+        """Return lengths and middles of the stretches that are not on their tracks, falling."""
         labels, truth = self.labels, self.truth.labels
         wanted = np.append(self.mains(), -1)[truth]
         order = np.lexsort((self.d.frame_of, labels, truth))
@@ -202,35 +215,36 @@ class Corrector:
         known = {*self.seen, *self.stated.values()}
         runs = [run[~np.isin(run, list(known))] for run in np.split(order, edges)]
         left = [(len(run), -int(run[len(run) // 2])) for run in runs if len(run)]
-        n, i = max(left, default=(0, 1))
-        return n, -i
+        return [(n, -i) for n, i in sorted(left, reverse=True)]
 
-    def search(self) -> bool:
-        """State the marker of the longest stretch that is not on the track of its marker."""
-        n, middle = self.longest()
-        if not n:
-            return False
-        self.seen.add(middle)
-        return self.say(middle)
-
-    def say(self, detection: int) -> bool:
-        """State of which marker a detection is, and undo it if more becomes wrong than right."""
-        stated = dict(self.stated)
-        change = self.state(detection)
-        if change is not None:
-            wanted = np.append(self.mains(), -1)[self.truth.labels[change.detections]]
-            is_worse = (change.before == wanted).sum() > (change.after == wanted).sum()
-            if is_worse and self.undoes:
-                self.correction.undo()
-                self.stated = stated
+    def say(self, limit: int) -> bool:
+        """Make the statement that gains most an action, of those about the largest errors."""
+        before, best, found = idf1(self.labels, self.truth), 0.0, None
+        places = dict.fromkeys([*self.offered(), *(i for _, i in self.longest()[:PREVIEWS])])
+        for detection in places:
+            stated = dict(self.stated)
+            for edit in self.statements(detection):
+                self.looks += 1
+                if self.actions + n_actions(edit) <= limit and self.edit(*edit) is not None:
+                    gain = (idf1(self.labels, self.truth) - before) / n_actions(edit)
+                    self.correction.undo()
+                    if gain > best:
+                        best, found = gain, (edit, dict(self.stated))
+            self.stated = stated
+        if found is None:
+            self.seen |= places.keys()
+            return bool(places)
+        edit, self.stated = found
+        self.actions += n_actions(edit)
+        self.seen.add(edit[-1])
+        self.edit(*edit)
         return True
 
-    def state(self, detection: int) -> Change | None:
-        """State of which marker a detection is."""
-        self.actions += 1
+    def statements(self, detection: int) -> list[tuple[Any, ...]]:
+        """Return the edits that state of which marker a detection is."""
         marker, labels = int(self.truth.labels[detection]), self.labels
         if marker < 0:
-            return self.edit("clutter", detection)
+            return [("clutter", detection)]
         if marker not in self.stated:
             own = np.flatnonzero(
                 (self.truth.labels == marker) & (labels == self.mains()[marker]) & (labels >= 0)
@@ -240,9 +254,16 @@ class Corrector:
             self.stated[marker] = self.correction.anchor(own) if len(own) else detection
             if not len(own):  # it has no track
                 if labels[detection] >= 0 and len(others):
-                    return self.edit("different", self.correction.anchor(others), detection)
-                return self.edit("name", detection)
-        return self.edit("same", self.stated[marker], detection)
+                    return [("different", self.correction.anchor(others), detection)]
+                return [("name", detection)]
+        own = np.flatnonzero(labels == labels[detection]) if labels[detection] >= 0 else [detection]
+        is_of = np.concatenate([[False], self.truth.labels[own] == marker, [False]])
+        ends, at = np.flatnonzero(~is_of), np.searchsorted(own, detection) + 1
+        last = np.searchsorted(ends, at)
+        first, end = own[ends[last - 1]], own[ends[last] - 2]
+        anchor = self.stated[marker]
+        alone = (first, end) if first < end else (first,)
+        return [("same", anchor, detection), ("only", anchor, *alone)]
 
     def edit(self, kind: EditKind, *detections: int) -> Change | None:
         """Apply an edit, and measure how long that takes."""
@@ -256,7 +277,7 @@ class Corrector:
             self.refused += 1
             return None
         finally:
-            if kind != "reassign":
+            if kind not in REASSIGN:
                 self.seconds.append(time.perf_counter() - start)
 
 
@@ -340,12 +361,24 @@ def latency() -> list[list[str]]:
     return rows
 
 
+def sums(rows: list[list[str]]) -> str:
+    """Return the sum of the actions of all listed results, and the largest share of one."""
+    counts = np.array([(int(row[6]), int(row[8])) for row in rows]).reshape(-1, 2)
+    (actions, by_hand), large = counts.sum(axis=0), counts[counts[:, 1] >= SHARE]
+    share = 100 * (large[:, 0] / large[:, 1]).max(initial=0)
+    return (
+        f"{actions} actions in all, {by_hand} by hand. Where at least {SHARE} are needed by hand, "
+        f"at most {share:.0f} % of them; of fewer, one action is more than a quarter."
+    )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     beside = Path(__file__).resolve().parents[2] / "shared" / "data"
     parser.add_argument("--data", type=Path, default=beside)
     parser.add_argument("--only", default="")
     parser.add_argument("--condition", default="")
+    parser.add_argument("--seed", type=int, default=1, help="of the corruption")
     parser.add_argument("--markdown", type=Path)
     args = parser.parse_args()
     rows: list[list[str]] = []
@@ -357,7 +390,7 @@ def main() -> None:
         if not any(recorded.names):
             continue  # unnamed trajectories are pieces of markers, and no truth
         for name, corrupt in CONDITIONS.items():
-            truth = corrupt(recorded)
+            truth = SEEDED[name](recorded, args.seed) if name in SEEDED else corrupt(recorded)
             if args.condition not in name or truth.labels.max(initial=-1) < 0:
                 continue
             made = Corrector(truth)
@@ -386,7 +419,7 @@ def main() -> None:
     times = table(["statement", "median, ms", "99 %, ms"], latency())
     found = table(header, rows)
     right = f"{n_right} more results reach the goal before any action."
-    publish([conditions(), "", *found, "", right, "", *times], args.markdown)
+    publish([conditions(), "", *found, "", sums(rows), "", right, "", *times], args.markdown)
 
 
 if __name__ == "__main__":

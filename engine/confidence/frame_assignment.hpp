@@ -30,6 +30,13 @@ class FrameAssignment {
       if (std::find(is_open.begin() + offsets[t], end, 1) != end) assign(t);
     }
   }
+  // Log odds of a detection of a track being of it, by distances where they are known, and motion.
+  double support(std::int64_t t, std::int64_t i) {
+    const std::int64_t k = score_.label(i);
+    const double distances = score_.own_distances(t, i, k);
+    const double motion = score_.motion(i, score_.between(k, around(t, k)));
+    return motion + (distances == kNone ? 0 : distances);
+  }
 
  private:
   static constexpr double kNone = -std::numeric_limits<double>::infinity();

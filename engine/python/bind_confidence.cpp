@@ -180,6 +180,40 @@ class Profiles {
                              const In<std::int64_t>& offsets, const In<bool>& is_open,
                              const In<double>& ghost, const In<double>& sigma, double log_clutter,
                              double change, std::int64_t max_gap) {
+    std::vector<std::int64_t> own(flat(labels).begin(), flat(labels).end());
+    score(points, own, offsets, is_open, ghost, sigma, log_clutter, change, max_gap,
+          [](AssignmentScore& found) {
+            FrameAssignment(found).run();
+            RunExchanges(found).run();
+          });
+    return array_of<std::int64_t>(own);
+  }
+
+  // Log odds of each asked detection being of its track instead of clutter, by its distances and
+  // motion; 0 for one without a track.
+  Out<double> supports(const In<double>& points, const In<std::int64_t>& labels,
+                       const In<std::int64_t>& offsets, const In<bool>& is_asked,
+                       const In<double>& ghost, const In<double>& sigma, double log_clutter,
+                       std::int64_t max_gap) {
+    std::vector<std::int64_t> own(flat(labels).begin(), flat(labels).end());
+    std::vector<double> found(own.size(), 0);
+    score(points, own, offsets, is_asked, ghost, sigma, log_clutter, 0, max_gap,
+          [&](AssignmentScore& of) {
+            FrameAssignment frames(of);
+            for (std::int64_t t = 0; t < of.n_frames(); ++t)
+              for (std::int64_t i = of.all().offsets[t]; i < of.all().offsets[t + 1]; ++i)
+                if (of.all().is_open[i] && own[i] >= 0) found[i] = frames.support(t, i);
+          });
+    return array_of<double>(found);
+  }
+
+ private:
+  // Uses the score of an assignment, without the lock of Python.
+  template <typename Use>
+  void score(const In<double>& points, std::vector<std::int64_t>& labels,
+             const In<std::int64_t>& offsets, const In<bool>& is_open, const In<double>& ghost,
+             const In<double>& sigma, double log_clutter, double change, std::int64_t max_gap,
+             Use&& use) {
     require(points.ndim() == 2 && points.shape(1) >= 1 && points.shape(1) <= kMaxAxes,
             "points: shape (N, D)");
     require_finite(points);
@@ -188,23 +222,17 @@ class Profiles {
             "labels, is_open and ghost: one for each point");
     require(static_cast<std::int64_t>(sigma.size()) == n_tracks_, "sigma: one for each track");
     require_offsets(flat(offsets), n, "offsets: rising, within the points");
-    for (const std::int64_t k : flat(labels)) require(k >= -1 && k < n_tracks_, "labels: below K");
+    for (const std::int64_t k : labels) require(k >= -1 && k < n_tracks_, "labels: below K");
     const auto D = static_cast<int>(points.shape(1));
     const std::vector<Point> at = to_points(points, D);
-    std::vector<std::int64_t> own(flat(labels).begin(), flat(labels).end());
     const std::vector<std::uint8_t> open(flat(is_open).begin(), flat(is_open).end());
-    {
-      nb::gil_scoped_release release;
-      const OpenFrames all{at,          flat(offsets), open,    flat(ghost), flat(sigma),
-                           log_clutter, change,        max_gap, D};
-      AssignmentScore score(all, *profiles_, own);
-      FrameAssignment(score).run();
-      RunExchanges(score).run();
-    }
-    return array_of<std::int64_t>(own);
+    nb::gil_scoped_release release;
+    const OpenFrames all{at,          flat(offsets), open,    flat(ghost), flat(sigma),
+                         log_clutter, change,        max_gap, D};
+    AssignmentScore found(all, *profiles_, labels);
+    use(found);
   }
 
- private:
   static constexpr std::size_t kBlock = 64;  // parts that a thread takes at a time
 
   std::vector<TrackPart> parts_of(const In<std::int64_t>& tracks, const In<std::int64_t>& frames,
@@ -281,5 +309,7 @@ void bind_confidence(nb::module_& module) {
            "ghost"_a, "sigma"_a, nb::kw_only(), "log_clutter"_a, "change"_a, "max_gap"_a)
       .def("compare", &Profiles::compare, "tracks"_a, "frames"_a, "offsets"_a, "partners"_a,
            nb::kw_only(), "n_threads"_a)
-      .def("densities", &Profiles::densities, "tracks"_a, "frames"_a, "offsets"_a, "others"_a);
+      .def("densities", &Profiles::densities, "tracks"_a, "frames"_a, "offsets"_a, "others"_a)
+      .def("supports", &Profiles::supports, "points"_a, "labels"_a, "offsets"_a, "is_asked"_a,
+           "ghost"_a, "sigma"_a, nb::kw_only(), "log_clutter"_a, "max_gap"_a);
 }

@@ -564,6 +564,19 @@ class DistanceProfiles:
     ) -> tuple[NDArray[np.bool_], Floats, Floats, Ints, Floats]: ...
     # Log densities of other tracks and of an unknown marker, relative to the own track.
     def densities(self, tracks: Ints, frames: Ints, offsets: Ints, others: Ints) -> Floats: ...
+    # Log odds of each asked detection being of its track instead of clutter, 0 without a track.
+    def supports(
+        self,
+        points: Floats,
+        labels: Ints,
+        offsets: Ints,
+        is_asked: NDArray[np.bool_],
+        ghost: Floats,
+        sigma: Floats,
+        *,
+        log_clutter: float,
+        max_gap: int,
+    ) -> Floats: ...
 
 # (predicted position of what was at `then`, its variance beyond `r`, log densities of points)
 def carried(

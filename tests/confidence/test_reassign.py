@@ -6,7 +6,7 @@ import numpy as np
 
 import asterism as am
 from asterism import _engine
-from asterism.tracking.confidence.reassign import ghost_log_odds, reassigned
+from asterism.tracking.confidence.reassign import EVEN_ODDS, gains, ghost_log_odds, reassigned
 from tests.references.reassignment import Reassignment
 from tests.scenes import moving, sized
 
@@ -74,6 +74,28 @@ def test_two_tracks_that_are_exchanged_over_runs_of_frames_return():
     np.testing.assert_array_equal(found, truth.labels)
 
 
+def test_at_even_odds_what_is_more_probable_than_not_is_taken():
+    truth, tracks = body()
+    is_open, ghost = tracks.labels != truth.labels, np.where(tracks.labels < 0, 2.0, 0.0)
+    noisy = 100 * NOISE  # distances that tell little
+    strict = reassigned(tracks, is_open, ghost, noisy)
+    found = reassigned(tracks, is_open, ghost, noisy, EVEN_ODDS)
+    lost = tracks.labels < 0
+    assert (strict[lost] < 0).all()
+    np.testing.assert_array_equal(found[lost], truth.labels[lost])
+
+
+def test_right_changes_gain_and_wrong_ones_lose():
+    truth, tracks = body()
+    ghost = np.zeros(len(tracks.labels))
+    found = gains(tracks, truth.labels, ghost, NOISE)
+    is_changed = tracks.labels != truth.labels
+    assert (found[is_changed] > 0).all()
+    assert not found[~is_changed].any()
+    back = gains(truth, tracks.labels, ghost, NOISE)
+    assert back[is_changed].sum() < 0
+
+
 def exchanged_at_random(rng, n=5, frames=9):
     """A near-rigid body with missing detections and clutter, and exchanges over runs of frames."""
     shape = rng.uniform(-0.15, 0.15, (n, 3))
@@ -91,7 +113,10 @@ def exchanged_at_random(rng, n=5, frames=9):
 
 
 def held_to_reference(seed):
-    """Return the number of changed labels, which are those of the reference implementation."""
+    """Return the number of changed labels, which are those of the reference implementation.
+
+    The support of each detection in its track is that of the reference implementation too.
+    """
     rng = np.random.default_rng([seed, 31])
     points, frame, labels = exchanged_at_random(rng)
     n_tracks, n_frames = labels.max() + 1, frame.max() + 1
@@ -105,6 +130,11 @@ def held_to_reference(seed):
         points, labels, offsets, is_open, ghost, sigma, log_clutter=-2.0, change=0.7, max_gap=3
     )
     reference = Reassignment(points, frame, labels, is_open, ghost, sigma, 0.003, -2.0, 0.7, 3)
+    supports = engine.supports(
+        points, labels, offsets, is_open, ghost, sigma, log_clutter=-2.0, max_gap=3
+    )
+    expected = [reference.support(i) if is_open[i] else 0 for i in range(len(labels))]
+    np.testing.assert_allclose(supports, expected, atol=1e-9)
     np.testing.assert_array_equal(found, reference.assigned())
     return int((found != labels).sum())
 

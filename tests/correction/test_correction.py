@@ -13,7 +13,7 @@ from asterism.edit import Session
 from asterism.model import Edit
 from asterism.simulate import Burst, Ghosts
 from asterism.tracking.attempts import Uncorrected
-from asterism.tracking.correction.change import change_of
+from asterism.tracking.correction.change import change_of, without_improbable
 from asterism.tracking.correction.constraints import Constraints, detections_of
 from asterism.tracking.correction.solver import Solver
 from tests.scenes import sized
@@ -60,6 +60,55 @@ def test_one_statement_mends_an_exchange_on_both_tracks(end):
     found = am.tracking.correct(tracks, [edit], model)
     assert am.evaluate(tracks, truth).idf1 < 1
     assert am.evaluate(found, truth).idf1 == 1
+
+
+@pytest.mark.parametrize("last", [120, 150])
+def test_one_detection_or_those_up_to_another_are_exchanged_alone(last):
+    truth = am.simulate.person(activity="walk", frames=300, seed=3)
+    a, b = nearest_pair(truth, 100)
+    tracks = swapped(truth, a, b, 120, last + 1)
+    correction = am.tracking.Correction(tracks, am.estimate_model(truth.detections).model)
+    own = np.flatnonzero(truth.labels == a)
+    stated = own[[20, *sorted({120, last})]]
+    change = correction.apply(Edit(kind="only", at=at(truth.detections, *stated)))
+    np.testing.assert_array_equal(correction.tracks.labels, truth.labels)
+    assert len(change.detections) == 2 * (last - 119)
+    same = correction.constraints.group(int(stated[0]))
+    assert same == set(stated[:2].tolist())
+    correction.undo()
+    np.testing.assert_array_equal(correction.tracks.labels, tracks.labels)
+
+
+def test_a_stated_detection_is_not_exchanged_for_another():
+    truth = am.simulate.person(activity="walk", frames=300, seed=3)
+    d, (a, b) = truth.detections, nearest_pair(truth, 100)
+    correction = am.tracking.Correction(truth, am.estimate_model(d).model)
+    one, other = (np.flatnonzero(truth.labels == k) for k in (a, b))
+    correction.apply(Edit(kind="same", at=at(d, one[20], one[120])))
+    with pytest.raises(am.errors.ParameterError, match="respects the earlier edits"):
+        correction.apply(Edit(kind="only", at=at(d, one[60], other[120])))
+    np.testing.assert_array_equal(correction.tracks.labels, truth.labels)
+
+
+def test_what_was_stated_stays_on_its_track():
+    truth = am.simulate.person(activity="walk", frames=300, seed=3)
+    d, (a, b) = truth.detections, nearest_pair(truth, 100)
+    # By the evidence, the first 260 frames are exchanged, and not the last 40.
+    correction = am.tracking.Correction(swapped(truth, a, b, 0, 260), am.estimate_model(d).model)
+    own = np.flatnonzero(truth.labels == a)
+    correction.apply(Edit(kind="same", at=at(d, own[280], own[290])))
+    correction.apply(Edit(kind="same", at=at(d, own[280], own[100])))
+    assert correction.tracks.labels[own[280]] == a
+    np.testing.assert_array_equal(correction.tracks.labels, truth.labels)
+
+
+def test_changes_that_lose_are_left_out_with_all_that_depends_on_them():
+    before = np.array([0, 1, 0, 1, -1, -1])
+    after = np.array([1, 0, 0, 1, 0, 1])
+    frame = np.array([0, 0, 1, 1, 2, 2])
+    log_odds = np.array([3.0, -4.0, 0.0, 0.0, 1.0, -1.0])
+    found = without_improbable(before, after, log_odds, frame)
+    np.testing.assert_array_equal(found, [0, 1, 0, 1, 0, -1])
 
 
 def test_a_cut_parts_a_track_exactly_there():
@@ -115,7 +164,7 @@ def test_clutter_deletes_a_part_and_same_brings_it_back(walk):
 
 def random_edit(rng, tracks):
     d, labels = tracks.detections, tracks.labels
-    kind = str(rng.choice(["same", "same", "same", "different", "cut", "clutter", "name"]))
+    kind = str(rng.choice(["same", "same", "same", "only", "different", "cut", "clutter", "name"]))
     i, j = rng.choice(len(labels), 2, replace=False)
     if kind == "cut":
         own = np.flatnonzero(labels == labels[i])
@@ -132,7 +181,7 @@ def random_edit(rng, tracks):
 def holds(edit, tracks):
     own = detections_of(edit, tracks.detections)
     labels = tracks.labels[list(own)]
-    if edit.kind == "same":
+    if edit.kind in ("same", "only"):
         return labels[0] == labels[1] >= 0
     if edit.kind in ("different", "cut"):
         return labels[0] != labels[1] or labels[0] < 0

@@ -246,6 +246,58 @@ def test_a_point_of_clutter_is_joined_by_keyboard(browser, served):
     page.close()
 
 
+def test_two_tracks_are_exchanged_between_two_frames(browser, served):
+    page = opened(browser, served)
+    tracks = session_of(served, path="none.toml").tracks
+    there = [set(tracks.labels[tracks.detections.frame_of == t]) for t in (100, 104)]
+    one, other = sorted(set.intersection(*there) - {-1})[:2]
+    page.key("Escape")
+    page.run(f"asterism.seek(100); asterism.choose({one})")
+    page.key("e")
+    page.run(f"asterism.choose({other})")
+    page.key("h")  # in this frame alone
+    on_disk(page, 1)
+    page.key("z")
+    on_disk(page, 0)
+    pressed = "document.getElementById('edit-mark').getAttribute('aria-pressed')"
+    page.key("h", shift=True)
+    assert page.run(pressed) == "true"
+    page.run("asterism.seek(104)")
+    page.run(f"asterism.choose({one})")
+    page.key("e")
+    page.run(f"asterism.choose({other})")
+    press(page, "#edit-here")
+    on_disk(page, 1)
+    assert page.run(pressed) == "false"
+    (edit,) = edits_of(served)
+    assert (edit.kind, edit.at[1][0], edit.at[2][0]) == ("only", 100, 104)
+    changed = np.flatnonzero(session_of(served).tracks.labels != tracks.labels)
+    assert set(tracks.detections.frame_of[changed]) <= set(range(100, 105))
+    assert_same_tracks(page, session_of(served))
+    page.close()
+
+
+def test_edits_are_previewed_first_where_that_is_wanted(browser, served):
+    page = opened(browser, served)
+    page.key("q")
+    button = "document.getElementById('edit-ahead')"
+    assert page.run(f"{button}.getAttribute('aria-pressed')") == "true"
+    assert page.run(f"{button}.getAttribute('aria-label')") == "Preview edits before they are made"
+    for leave in ("Escape", "Enter"):
+        page.key("2")
+        page.wait(f"{PREVIEW}.includes('would change')")
+        assert edits_of(served) == () if (served.folder / "trial.edits.toml").exists() else True
+        page.key(leave)
+        page.wait(f"{PREVIEW} === ''")
+    on_disk(page, 1)
+    assert_same_tracks(page, session_of(served))
+    press(page, "#edit-ahead")
+    assert page.run(f"{button}.getAttribute('aria-pressed')") == "false"
+    page.key("z")
+    on_disk(page, 0)
+    page.close()
+
+
 PREVIEW = "document.getElementById('filling').innerText"
 
 
@@ -273,6 +325,25 @@ def test_an_assignment_of_all_points_is_previewed_and_confirmed(browser, by_meth
     assert "Take back" in page.run("document.getElementById('changed').innerText")
     page.key("r")
     on_disk(page, 2)
+    assert_same_tracks(page, session_of(by_method, am.GNN()))
+    page.close()
+
+
+def test_an_assignment_at_even_odds_changes_more(browser, by_method):
+    page = opened(browser, by_method)
+    n = []
+    for shift in (False, True):
+        page.key("t", shift=shift)
+        page.wait(f"{PREVIEW}.includes('would change')")
+        n.append(n_previewed(page))
+        page.key("Escape")
+        page.wait(f"{PREVIEW} === ''")
+    assert n[0] < n[1]
+    page.run("document.getElementById('edit-reassign-even').click()")
+    page.wait(f"{PREVIEW}.includes('would change')")
+    page.key("Enter")
+    on_disk(page, 1)
+    assert [each.kind for each in edits_of(by_method)] == ["reassign_even"]
     assert_same_tracks(page, session_of(by_method, am.GNN()))
     page.close()
 

@@ -121,7 +121,7 @@ def test_long_messages_are_refused(served):
         ("edit", EDIT.replace(b"}", b', "path": "/etc"}'), "message: expected the fields"),
         ("edit", EDIT.replace(b"clutter", b"all"), "kind: expected same or"),
         ("edit", EDIT.replace(b"[0]", b"[]"), "detections: expected a list of numbers"),
-        ("edit", EDIT.replace(b"[0]", b"[0, 1, 2]"), "detections: expected a list of numbers"),
+        ("edit", EDIT.replace(b"[0]", b"[0, 1, 2, 3]"), "detections: expected a list of numbers"),
         ("edit", EDIT.replace(b"[0]", b"[true]"), "detections: expected a list of numbers"),
         ("edit", EDIT.replace(b"[0]", b"[-1]"), "detections: expected a list of numbers"),
         ("edit", EDIT.replace(b"[0]", b"[0.5]"), "detections: expected a list of numbers"),

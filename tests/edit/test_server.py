@@ -49,7 +49,7 @@ def test_an_edit_is_on_disk_when_it_is_answered(served):
 
 def test_an_assignment_is_on_disk_once_it_is_confirmed_and_not_before(by_method):
     capture, path = am.read(by_method.folder / CAPTURE), by_method.folder / "trial.edits.toml"
-    status, preview = by_method.post("preview_reassign")
+    status, preview = by_method.post("preview_reassign", is_even=False)
     assert status == 200
     assert preview["stretches"]
     assert not path.exists()
@@ -60,6 +60,11 @@ def test_an_assignment_is_on_disk_once_it_is_confirmed_and_not_before(by_method)
     assert answer["stretches"] == preview["stretches"]
     (edit,) = am.io.read_edits(path, capture)
     assert edit.kind == "reassign"
+    _, even = by_method.post("preview_reassign", is_even=True)
+    assert by_method.post("reassign", version=even["version"], without=[])[0] == 200
+    assert am.io.read_edits(path, capture)[1].kind == "reassign_even"
+    by_method.post("undo")
+    assert by_method.post("preview_reassign")[0] == 400
     session = am.edit.Session.open(
         capture, path, am.tracking.plan_tracking(capture, am.GNN()).recipe
     )
@@ -69,7 +74,7 @@ def test_an_assignment_is_on_disk_once_it_is_confirmed_and_not_before(by_method)
 
 def test_changes_that_are_left_out_stay_out_of_later_assignments(by_method):
     capture, path = am.read(by_method.folder / CAPTURE), by_method.folder / "trial.edits.toml"
-    _, preview = by_method.post("preview_reassign")
+    _, preview = by_method.post("preview_reassign", is_even=False)
     stretches = preview["stretches"]
     group = stretches[0]["group"]
     n = sum(each["n_detections"] for each in stretches if each["group"] == group)
@@ -81,10 +86,24 @@ def test_changes_that_are_left_out_stay_out_of_later_assignments(by_method):
     assert len(kept) == n
     assert answer["detections"]
     assert not set(kept) & set(answer["detections"])
-    _, again = by_method.post("preview_reassign")
+    _, again = by_method.post("preview_reassign", is_even=False)
     status, answer = by_method.post("reassign", version=again["version"], without=[])
     assert status == 200
     assert not set(kept) & set(answer["detections"])
+
+
+def test_an_edit_and_an_answer_are_previewed_without_being_made(served):
+    capture, path = am.read(served.folder / CAPTURE), served.folder / "trial.edits.toml"
+    _, message = same(served)
+    choice = {"assessment": 0, "decision": 0, "alternative": 0}
+    for action, values in (("edit", message), ("choose", choice)):
+        status, preview = served.post(f"preview_{action}", **values)
+        assert status == 200
+        assert not path.exists() or not am.io.read_edits(path, capture)
+        _, answer = served.post(action, **values)
+        assert answer["stretches"] == preview["stretches"]
+        served.post("undo")
+    assert served.post("preview_edit", kind="reassign", detections=[0], name="")[0] != 200
 
 
 def test_contradictions_are_refused_and_change_nothing(served):

@@ -12,8 +12,10 @@ D = am.simulate.cube(frames=20, seed=1).detections
 EDITS = (
     Edit(kind="same", at=((3, 0), (9, 2)), who="Ada", when="2026-11-25T09:00:00+00:00"),
     Edit(kind="name", at=((4, 1),), name='a "name" \\ with\nall'),
+    Edit(kind="only", at=((3, 0), (9, 2), (12, 2))),
     Edit(kind="no_fill", at=((4, 1), (7, 1))),
     Edit(kind="reassign", at=(), who="Ada"),
+    Edit(kind="reassign_even", at=((4, 1),)),
 )
 
 

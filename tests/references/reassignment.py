@@ -88,6 +88,18 @@ class Reassignment:
         shape = student.logpdf(off / spread, 3) - student.logpdf(0, 3)
         return MOTION * (peak + shape * (3 + n) / 4 - self.log_clutter)
 
+    def around(self, t, k):
+        """Return the nearest two detections of a track before and after a frame."""
+        own = np.flatnonzero((self.labels == k) & (abs(self.frame - t) <= self.max_gap))
+        return [*own[self.frame[own] < t][-2:], *own[self.frame[own] > t][:2]]
+
+    def support(self, i):
+        """Return the score of a detection in its own track, 0 without one."""
+        k = self.labels[i]
+        if k < 0:
+            return 0.0
+        return (self.distances(i, k, k) or 0) + self.motion(i, k, self.around(self.frame[i], k))
+
     def assign(self, t):
         """Assign the open detections of a frame to the tracks."""
         rows = np.flatnonzero((self.frame == t) & self.is_open)
@@ -101,9 +113,7 @@ class Reassignment:
                 continue
             gain = self.change if k == now else 0
             if distances is not None:
-                own = np.flatnonzero((self.labels == k) & (abs(self.frame - t) <= self.max_gap))
-                before, after = own[self.frame[own] < t], own[self.frame[own] > t]
-                gain += distances + self.motion(i, k, [*before[-2:], *after[:2]])
+                gain += distances + self.motion(i, k, self.around(t, k))
             if now < 0:
                 gain -= self.change + self.ghost[i]
             gains[r, k] = max(gain, 0)

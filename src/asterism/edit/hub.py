@@ -94,7 +94,9 @@ class Hub:
         if action == "preview":
             return await self._preview(message)
         if action == "preview_reassign":
-            return await self._preview_reassign()
+            return await self._preview_reassign(is_even=message["is_even"])
+        if action in ("preview_edit", "preview_choose"):
+            return await self._preview_edit(action.removeprefix("preview_"), message)
         if action == "save":
             return await self._save()
         async with self._lock:
@@ -150,7 +152,9 @@ class Hub:
         if action == "reassign":
             if self._offer is None or not self._offer[0] == message["version"] == len(self._log):
                 raise ParameterError("version", "that of the last preview", message["version"])
-            return session.edit("reassign", *self._offer[1].of_groups(message["without"]).tolist())
+            offered = self._offer[1]
+            left_out = offered.of_groups(message["without"]).tolist()
+            return session.edit(offered.edit.kind, *left_out)
         if action == "fill":
             return session.fill(*self._gap(message), message["kind"])
         at = self._assessment_of - message["assessment"]
@@ -186,9 +190,15 @@ class Hub:
             "points": np.round(points, 5).tolist(), "sigma": np.round(sigma, 6).tolist(),
         }  # fmt: skip
 
-    async def _preview_reassign(self) -> dict[str, Any]:
+    async def _preview_edit(self, action: str, message: Message) -> dict[str, Any]:
         async with self._lock:
-            edit = self.session.edit("reassign")
+            edit = self._edit(action, message)
+            change = await asyncio.to_thread(self.session.preview, edit)
+        return {"stretches": self.view.stretches(change)}
+
+    async def _preview_reassign(self, *, is_even: bool) -> dict[str, Any]:
+        async with self._lock:
+            edit = self.session.edit("reassign_even" if is_even else "reassign")
             change = await asyncio.to_thread(self.session.preview, edit)
             self._offer = len(self._log), change
         return {"stretches": self.view.stretches(change), "version": self._offer[0]}

@@ -6,18 +6,20 @@ import json
 from typing import Any, get_args
 
 from asterism.errors import ParameterError
-from asterism.model.edit import EditKind
+from asterism.model.edit import REASSIGN, EditKind
 
 __all__ = ["Message", "parsed"]
 
 Message = dict[str, Any]
 _NUMBER, _TEXT, _NUMBERS, _CHOICE = "a whole number", "a text", "a list of numbers", "a number"
-_GROUPS = "a list of groups"
+_GROUPS, _FLAG = "a list of groups", "true or false"
 _FIELDS: dict[str, dict[str, str]] = {
     "edit": {"kind": _TEXT, "detections": _NUMBERS, "name": _TEXT},
     "fill": {"kind": _TEXT, "track": _NUMBER, "first": _NUMBER, "last": _NUMBER},
     "preview": {"track": _NUMBER, "first": _NUMBER, "last": _NUMBER},
-    "preview_reassign": {},
+    "preview_reassign": {"is_even": _FLAG},
+    "preview_edit": {"kind": _TEXT, "detections": _NUMBERS, "name": _TEXT},
+    "preview_choose": {"assessment": _NUMBER, "decision": _NUMBER, "alternative": _CHOICE},
     "reassign": {"version": _NUMBER, "without": _GROUPS},
     "choose": {"assessment": _NUMBER, "decision": _NUMBER, "alternative": _CHOICE},
     "refuse": {"version": _NUMBER, "stretch": _NUMBER},
@@ -26,12 +28,10 @@ _FIELDS: dict[str, dict[str, str]] = {
     "save": {},
 }
 _FILLS = ("fill", "no_fill")
-_KINDS = {
-    "edit": tuple(kind for kind in get_args(EditKind) if kind not in (*_FILLS, "reassign")),
-    "fill": _FILLS,
-}
+_STATED = tuple(kind for kind in get_args(EditKind) if kind not in (*_FILLS, *REASSIGN))
+_KINDS = {"edit": _STATED, "preview_edit": _STATED, "fill": _FILLS}
 _MAX_TEXT = 200
-_MAX_DETECTIONS = 2
+_MAX_DETECTIONS = 3
 _MAX_GROUPS = 1000
 
 
@@ -88,6 +88,8 @@ def parsed(action: str, body: bytes) -> Message:
 def _is(value: Any, kind: str) -> bool:
     if kind == _TEXT:
         return isinstance(value, str) and len(value) <= _MAX_TEXT
+    if kind == _FLAG:
+        return isinstance(value, bool)
     if kind == _NUMBERS:
         return (
             isinstance(value, list)

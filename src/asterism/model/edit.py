@@ -10,10 +10,15 @@ from asterism.records import record
 
 __all__ = ["Edit", "EditKind"]
 
-EditKind = Literal["same", "different", "cut", "clutter", "name", "fill", "no_fill", "reassign"]
+EditKind = Literal[
+    "same", "only", "different", "cut", "clutter", "name", "fill", "no_fill", "reassign",
+    "reassign_even",
+]  # fmt: skip
+REASSIGN: tuple[EditKind, ...] = ("reassign", "reassign_even")
+"""Kinds that assign all uncertain detections once more."""
 
-N_DETECTIONS = {"clutter": 1, "name": 1, "reassign": None}
-"""Number of detections of an edit, where it is not two; None for any number."""
+N_DETECTIONS = {"clutter": (1,), "name": (1,), "only": (2, 3), **dict.fromkeys(REASSIGN)}
+"""Numbers of detections of an edit, where it is not two; None for any number."""
 
 
 @record
@@ -22,13 +27,17 @@ class Edit:
 
     Parameters
     ----------
-    kind : {"same", "different", "cut", "clutter", "name", "fill", "no_fill", "reassign"}
-        ``same``: both detections are of one marker. ``different``: they are not. ``cut``: they
+    kind : {"same", "only", "different", "cut", "clutter", "name", "fill", "no_fill", "reassign",
+        "reassign_even"}
+        ``same``: both detections are of one marker. ``only``: they are, and the second alone goes
+        to the track of the first, in exchange for that in its frame; with a third detection, those
+        of the second's track up to the third do. ``different``: they are not. ``cut``: they
         follow each other in a track and are not of one marker, and the track is parted exactly
         there. ``clutter``: the detection is a false alarm. ``name``: it is of the marker `name`.
         ``fill``, ``no_fill``: the gap between both detections is filled, or is left open.
         ``reassign``: all uncertain detections are assigned once more, given the tracks as the
         earlier edits have corrected them; those of the edit stay, now and in later ones.
+        ``reassign_even``: the same at even odds, for a person who looks at every change.
     at : tuple of (int, int)
         Frame of each detection, counted from 0, and its number among the points of that frame.
     name : str
@@ -62,14 +71,14 @@ class Edit:
     def __post_init__(self) -> None:
         if self.kind not in get_args(EditKind):
             raise ParameterError("kind", " or ".join(get_args(EditKind)), repr(self.kind))
-        n = N_DETECTIONS.get(self.kind, 2)
+        n = N_DETECTIONS.get(self.kind, (2,))
         at = tuple((frame, point) for frame, point in self.at)
-        if n is not None and len(at) != n:
-            expected = f"{n} detection{'s' * (n != 1)} for {self.kind!r}"
+        if n is not None and len(at) not in n:
+            expected = f"{' or '.join(map(str, n))} detection{'s' * (n != (1,))} for {self.kind!r}"
             raise ParameterError("at", expected, f"{len(at)}")
         for number in (number for each in at for number in each):
             check_number("at", number, above=0, closed=True, integer=True)
-        if n == 2 and at[0][0] == at[1][0] and self.kind != "different":
+        if n == (2,) and at[0][0] == at[1][0] and self.kind != "different":
             raise ParameterError("at", "detections of two frames", f"two of frame {at[0][0]}")
         if (self.kind == "name") != bool(self.name):
             expected = "the name of a marker" if self.kind == "name" else f"none for {self.kind!r}"

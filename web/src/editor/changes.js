@@ -4,9 +4,9 @@ import { byId, counted, frames, make, named } from "./dom.js";
 
 const MAX_LISTED = 5;
 const WORDS = {
-  same: "one marker", different: "different markers", cut: "cut", clutter: "ghost",
+  same: "one marker", only: "one marker, there alone", different: "different markers", cut: "cut", clutter: "ghost",
   name: "name", fill: "filled", no_fill: "left open",
-  reassign: "assigned again",
+  reassign: "assigned again", reassign_even: "assigned at even odds",
 };
 
 export class Changes {
@@ -63,7 +63,7 @@ export class Changes {
   /** List the edits, the last one first. */
   list(edits) {
     const items = edits.map(({ kind, at, name }) => {
-      const places = kind === "reassign" ? (at.length ? `without ${counted(at.length, "point")}` : "") : at.map(([frame, point]) => `frame ${frame} point ${point}`).join(", ");
+      const places = kind.startsWith("reassign") ? (at.length ? `without ${counted(at.length, "point")}` : "") : at.map(([frame, point]) => `frame ${frame} point ${point}`).join(", ");
       return make("li", {}, `${WORDS[kind]} `, name ? named(name) : "", ` ${places}`);
     });
     byId("edit-list").replaceChildren(...items.reverse().slice(0, 200));

@@ -2,7 +2,7 @@
 
 export class Corrections {
   constructor({ state, capture }, numbering, selection) {
-    Object.assign(this, { state, capture, numbering, selection });
+    Object.assign(this, { state, capture, numbering, selection, marked: -1 });
   }
 
   get track() {
@@ -26,6 +26,34 @@ export class Corrections {
       if (before >= 0 && after >= 0) return [edit("same", before, after)];
     }
     throw new Error("Both tracks are on one side of this frame: join them instead.");
+  }
+
+  /** Exchange two tracks in this frame alone, or from the marked frame to this one. */
+  here() {
+    const { numbering, selection, state, marked } = this;
+    const t = state.frame;
+    if (selection.point >= 0) {
+      const near = numbering.nearest(this.track, t, t);
+      if (near < 0) throw new Error("The track has no other detection.");
+      return [edit("only", near, selection.point)];
+    }
+    const [low, high] = [Math.min(marked < 0 ? t : marked, t), Math.max(marked, t)];
+    const [a, b] = this.pair();
+    for (const [one, other] of [[a, b], [b, a]]) {
+      const [first, last] = [numbering.from(other, low), numbering.before(other, high + 1)];
+      const earlier = numbering.before(one, low);
+      const anchor = earlier >= 0 ? earlier : numbering.from(one, high + 1);
+      if (first < 0 || anchor < 0 || numbering.frame[first] > high) continue;
+      this.marked = -1;
+      return [edit("only", anchor, ...new Set([first, last]))];
+    }
+    throw new Error("Neither track has a detection there and one outside.");
+  }
+
+  /** Mark this frame, or take the mark away. */
+  mark() {
+    this.marked = this.marked === this.state.frame ? -1 : this.state.frame;
+    return this.marked;
   }
 
   /** Two tracks are one marker, or a point of clutter is of a track. */

@@ -19,14 +19,14 @@ class Editor {
   constructor(player) {
     const { capture, state, stage, timeline, keys } = player;
     const header = capture.header.editor;
-    Object.assign(this, { ...player, header, early: new Map(), edits: [], pending: 0, isLost: false });
+    Object.assign(this, { ...player, header, early: new Map(), edits: [], pending: 0, isLost: false, isAhead: false });
     this.numbering = new Numbering(capture);
     this.server = header.is_served ? new Server(header.version) : new Collector(this.numbering, header);
     this.selection = new Selection(player, this.numbering);
     this.overlay = stage && new Overlay(stage, this.selection);
     this.corrections = new Corrections({ state, capture }, this.numbering, this.selection);
     this.changes = new Changes(capture, (message) => this.send("refuse", message));
-    this.decisions = new Decisions({ state, stage, timeline, capture }, (message) => this.send("choose", message));
+    this.decisions = new Decisions({ state, stage, timeline, capture }, (message) => this.make("choose", message));
     this.naming = new Naming(capture, header.names, (name) => this.correct(() => this.corrections.name(name)));
     this.listen();
     this.connect(keys);
@@ -56,6 +56,9 @@ class Editor {
     const { corrections, decisions, selection } = this;
     const act = {
       swap: () => this.correct(() => corrections.swap()),
+      here: () => this.correct(() => corrections.here()),
+      mark: () => this.mark(),
+      ahead: () => this.lookAhead(),
       join: () => this.correct(() => corrections.join()),
       cut: () => this.correct(() => corrections.cut(false)),
       "cut-back": () => this.correct(() => corrections.cut(true)),
@@ -63,7 +66,8 @@ class Editor {
       ghost: () => this.correct(() => corrections.ghost()),
       fill: () => this.preview(),
       keep: () => selection.keep(),
-      reassign: () => this.previewAgain(),
+      reassign: () => this.previewAgain(false),
+      "reassign-even": () => this.previewAgain(true),
       lasso: () => this.overlay?.lasso(!this.overlay.isOn),
       undo: () => this.send("undo"),
       redo: () => this.send("redo"),
@@ -73,7 +77,9 @@ class Editor {
     for (const [name, does] of Object.entries(act)) byId(`edit-${name}`).addEventListener("click", does);
     Object.assign(keys, {
       n: () => decisions.step(1), p: () => decisions.step(-1),
-      x: act.swap, j: act.join, v: act["cut-whole"], k: act.ghost, g: act.fill, e: act.keep, t: act.reassign,
+      x: act.swap, j: act.join, v: act["cut-whole"], k: act.ghost, g: act.fill, e: act.keep,
+      t: (event) => act[event.shiftKey ? "reassign-even" : "reassign"](),
+      h: (event) => (event.shiftKey ? act.mark : act.here)(), q: act.ahead,
       c: (event) => (event.shiftKey ? act["cut-back"] : act.cut)(),
       o: act.lasso, u: () => selection.stepPoint(), i: () => this.naming.begin(),
       z: (event) => (event.shiftKey ? act.redo : act.undo)(), y: act.redo, b: act.save,
@@ -96,7 +102,39 @@ class Editor {
     this.attempt(() => {
       edits = make();
     });
-    for (const edit of edits ?? []) if (!(await this.send("edit", edit))) return;
+    for (const edit of edits ?? []) if (!(await this.make("edit", edit))) return;
+  }
+
+  /** Mark the frame from which two tracks are exchanged. */
+  mark() {
+    const is = this.corrections.mark() >= 0;
+    byId("edit-mark").ariaPressed = `${is}`;
+  }
+
+  /** Preview each edit before it is made, or no longer. */
+  lookAhead() {
+    this.isAhead = !this.isAhead;
+    byId("edit-ahead").ariaPressed = `${this.isAhead}`;
+  }
+
+  /** Make an edit, with a preview where the reader wants one; null if it is not made. */
+  async make(action, message) {
+    if (!this.isAhead) return this.send(action, message);
+    this.preview(null);
+    const answer = await this.send(`preview_${action}`, message);
+    if (!answer) return null;
+    const n = answer.stretches.reduce((sum, each) => sum + each.n_detections, 0);
+    return new Promise((made) => {
+      this.confirm = () => {
+        this.preview(null);
+        made(this.send(action, message));
+      };
+      byId("filling").replaceChildren(
+        make("p", {}, `With this edit, ${counted(n, "point")} would change:`),
+        make("div", { className: "tools" }, button("Confirm", "Enter", this.confirm), button("Dismiss", "Esc", () => this.preview(null))),
+        this.changes.listed(answer.stretches),
+      );
+    });
   }
 
   attempt(act) {
@@ -162,6 +200,7 @@ class Editor {
     this.changes.list(edits);
     this.preview(null);
     this.decisions.changed(touched);
+    byId("edit-mark").ariaPressed = `${this.corrections.marked >= 0}`;
     this.naming.list();
     if (!this.decisions.shown && this.decisions.list.length) this.decisions.step(1);
     else this.draw();
@@ -218,10 +257,10 @@ class Editor {
     this.stage?.redraw();
   }
 
-  /** Show what an assignment of all uncertain points, given what was stated, would change. */
-  async previewAgain() {
+  /** Show what an assignment of all uncertain points, perhaps at even odds, would change. */
+  async previewAgain(is_even) {
     this.preview(null);
-    const answer = await this.send("preview_reassign");
+    const answer = await this.send("preview_reassign", { is_even });
     if (!answer) return;
     const { stretches, version } = answer;
     if (!stretches.length) {
@@ -274,7 +313,7 @@ class Editor {
   }
 
   withoutServer() {
-    for (const name of ["fill", "redo", "reassign"]) byId(`edit-${name}`).hidden = true;
+    for (const name of ["fill", "redo", "reassign", "reassign-even", "ahead"]) byId(`edit-${name}`).hidden = true;
     byId("edit-save").firstChild.textContent = "Download edits";
     byId("decision").hidden = true;
     byId("uncertain-tile").hidden = true;

@@ -11,12 +11,22 @@ from asterism.tracking.estimation.evidence import Region
 from asterism.tracking.rigidity.profiles import learn_profiles
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from asterism.model import Tracks
     from asterism.tracking.stitching import Stitching
 
-__all__ = ["PROBABLE", "UNCERTAIN", "ghost_log_odds", "reassigned"]
+__all__ = [
+    "EVEN_ODDS",
+    "PROBABLE",
+    "ROUNDS",
+    "UNCERTAIN",
+    "gains",
+    "ghost_log_odds",
+    "reassigned",
+]
 
 UNCERTAIN = 0.8
 """Confidence of an identity below which a correction assigns a detection again."""
@@ -24,8 +34,11 @@ PROBABLE = float(np.log(20))
 """Log odds that a detection without a track must have to be taken."""
 CHANGE = 0.2
 """Log odds that a change must gain, so that labels of equal odds do not alternate."""
-ROUNDS = 3
-"""Largest number of times that all frames are assigned, each with the distances learnt anew."""
+ROUNDS = (PROBABLE,) * 3
+"""Log odds of each time that all frames are assigned, with the distances learnt anew."""
+EVEN_ODDS = (-PROBABLE, 0.0, 0.0)
+"""The same at even odds, where a person confirms the result. The first round finds runs of
+detections that support each other, of which no single one is probable."""
 REACH = 8
 """Number of frames before and after a detection by which its motion is predicted."""
 
@@ -35,6 +48,7 @@ def reassigned(
     is_open: NDArray[np.bool_],
     ghost: NDArray[np.float64],
     noise_sigma: float,
+    rounds: Sequence[float] = ROUNDS,
 ) -> NDArray[np.int64]:
     """Assign the open detections to the tracks, frame by frame and pair by pair; all others stay.
 
@@ -55,6 +69,9 @@ def reassigned(
         Log odds of each detection without a track being a ghost, as of `ghost_log_odds`.
     noise_sigma : float
         Standard deviation of a coordinate, metres.
+    rounds : sequence of float
+        Log odds that a detection without a track must have to be taken, of each round; the last
+        rounds are left out if nothing changes.
 
     Returns
     -------
@@ -63,19 +80,53 @@ def reassigned(
     """
     d, labels = tracks.detections, tracks.labels.astype(np.int64)
     points, offsets = np.ascontiguousarray(d.points), d.offsets.astype(np.int64)
-    n_clutter = max(int((labels < 0).sum()), 1)
-    log_clutter = float(np.log(n_clutter / (d.n_frames * Region.of(d).volume)))
-    sigma = _roughness(tracks) + noise_sigma
-    for _ in range(ROUNDS):
+    log_clutter, sigma = _log_clutter(tracks), _roughness(tracks) + noise_sigma
+    for i, odds in enumerate(rounds):
         engine = learn_profiles(d, labels, noise_sigma).engine
         found = engine.assigned(
-            points, labels, offsets, is_open, ghost + PROBABLE, sigma[: labels.max(initial=-1) + 1],
+            points, labels, offsets, is_open, ghost + odds, sigma[: labels.max(initial=-1) + 1],
             log_clutter=log_clutter, change=CHANGE, max_gap=REACH,
         )  # fmt: skip
-        if np.array_equal(found, labels):
+        if np.array_equal(found, labels) and len(set(rounds[i:])) == 1:
             break
         labels = found
     return labels
+
+
+def gains(
+    tracks: Tracks, after: NDArray[np.int64], ghost: NDArray[np.float64], noise_sigma: float
+) -> NDArray[np.float64]:
+    """Return the log odds that each detection gains by other labels, 0 where they are equal, (N,).
+
+    They are those of the distances and the motion, as in `reassigned`.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks of a capture.
+    after : ndarray of int, shape (N,)
+        Other labels, by which the distances are learnt.
+    ghost, noise_sigma
+        As for `reassigned`.
+    """
+    d, is_asked = tracks.detections, tracks.labels != after
+    engine = learn_profiles(d, after, noise_sigma).engine
+    sigma = (_roughness(tracks) + noise_sigma)[: after.max(initial=-1) + 1]
+    before = np.where(tracks.labels < len(sigma), tracks.labels, -1).astype(np.int64)
+    of_before, of_after = (
+        engine.supports(
+            np.ascontiguousarray(d.points), labels, d.offsets.astype(np.int64), is_asked, ghost,
+            sigma, log_clutter=_log_clutter(tracks), max_gap=REACH,
+        ) - np.where(labels < 0, 0.0, ghost) * is_asked
+        for labels in (before, after)
+    )  # fmt: skip
+    return of_after - of_before
+
+
+def _log_clutter(tracks: Tracks) -> float:
+    """Return the log density of clutter."""
+    d, n = tracks.detections, max(int((tracks.labels < 0).sum()), 1)
+    return float(np.log(n / (d.n_frames * Region.of(d).volume)))
 
 
 def ghost_log_odds(tracks: Tracks, stitching: Stitching | None) -> NDArray[np.float64]:

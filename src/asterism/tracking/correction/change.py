@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from asterism.model import Edit
 
-__all__ = ["Change", "Stretch", "change_of"]
+__all__ = ["Change", "Stretch", "change_of", "without_improbable"]
 
 
 @record
@@ -108,15 +108,9 @@ def change_of(
     changed = np.flatnonzero(labels[0] != labels[1])
     before, after = labels[0][changed], labels[1][changed]
     frame = frame_of[changed]
-    runs: list[NDArray[np.int64]] = []
-    for source, target in dict.fromkeys(zip(before.tolist(), after.tolist(), strict=True)):
-        which = np.flatnonzero((before == source) & (after == target))
-        runs += np.split(which, _breaks(changed[which], source, target, labels))
-    is_asked = np.isin(changed, own)
+    runs, is_asked = _runs(changed, labels), np.isin(changed, own)
     runs.sort(key=lambda run: (not is_asked[run].any(), frame[run[0]], before[run[0]]))
-    stretch_of = np.empty(len(changed), dtype=np.int64)
-    for i, run in enumerate(runs):
-        stretch_of[run] = i
+    stretch_of = _stretch_of(runs)
     groups = _groups(stretch_of, frame, before, after)
     old = [*names[0], *[None] * (len(names[1]) - len(names[0]))]
     return Change(
@@ -135,6 +129,53 @@ def change_of(
             if one != other
         },
     )  # fmt: skip
+
+
+def without_improbable(
+    before: NDArray[np.int64],
+    after: NDArray[np.int64],
+    log_odds: NDArray[np.float64],
+    frame_of: NDArray[np.int64],
+) -> NDArray[np.int64]:
+    """Return labels without the groups of changes that are less probable than none.
+
+    Parameters
+    ----------
+    before, after : ndarray of int, shape (N,)
+        Track of each detection before and after.
+    log_odds : ndarray of shape (N,)
+        Log odds that each gains by its change.
+    frame_of : ndarray of int, shape (N,)
+        Frame of each.
+    """
+    changed = np.flatnonzero(before != after)
+    stretch_of = _stretch_of(_runs(changed, (before, after)))
+    groups = _groups(stretch_of, frame_of[changed], before[changed], after[changed])
+    group_of = np.array(groups, dtype=np.int64)[stretch_of]
+    is_improbable = np.bincount(group_of, log_odds[changed])[group_of] <= 0
+    found = after.copy()
+    found[changed[is_improbable]] = before[changed[is_improbable]]
+    return found
+
+
+def _runs(
+    changed: NDArray[np.int64], labels: tuple[NDArray[np.int64], NDArray[np.int64]]
+) -> list[NDArray[np.int64]]:
+    """Return which of the changed detections are of each stretch."""
+    before, after = labels[0][changed], labels[1][changed]
+    runs: list[NDArray[np.int64]] = []
+    for source, target in dict.fromkeys(zip(before.tolist(), after.tolist(), strict=True)):
+        which = np.flatnonzero((before == source) & (after == target))
+        runs += np.split(which, _breaks(changed[which], source, target, labels))
+    return runs
+
+
+def _stretch_of(runs: list[NDArray[np.int64]]) -> NDArray[np.int64]:
+    """Return the stretch of each changed detection."""
+    found = np.empty(sum(map(len, runs)), dtype=np.int64)
+    for i, run in enumerate(runs):
+        found[run] = i
+    return found
 
 
 def _groups(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from asterism.errors import ParameterError
+from asterism.model.edit import REASSIGN
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -141,7 +142,7 @@ class Constraints:
             If it contradicts an earlier edit.
         """
         own = detections_of(edit, self.detections)
-        if edit.kind == "same":
+        if edit.kind in ("same", "only"):
             self._join(own[0], own[1], edit)
         elif edit.kind in ("different", "cut"):
             self._part(own[0], own[1], edit)
@@ -151,7 +152,7 @@ class Constraints:
             if own[0] in self._root:
                 self._refuse(edit, self._about(own[0]))
             self._clutter[own[0]] = edit
-        elif edit.kind == "reassign":
+        elif edit.kind in REASSIGN:
             self._kept.update(own)
         self.edits += (edit,)
 

@@ -9,8 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.model import Tracks
+from asterism.model.edit import REASSIGN
 from asterism.tracking.confidence.identity import assess
-from asterism.tracking.confidence.reassign import PROBABLE, UNCERTAIN, reassigned
+from asterism.tracking.confidence.reassign import (
+    EVEN_ODDS,
+    PROBABLE,
+    ROUNDS,
+    UNCERTAIN,
+    gains,
+    reassigned,
+)
+from asterism.tracking.correction.change import without_improbable
 from asterism.tracking.correction.constraints import Constraints, detections_of
 from asterism.tracking.correction.continuation import continuation
 from asterism.tracking.correction.evidence import Evidence
@@ -89,14 +98,16 @@ class Solver:
         own = detections_of(edit, self._d)
         if edit.kind == "same":
             self._join(own)
+        elif edit.kind == "only":
+            self._move(own[0], own[1], own[-1])
         elif edit.kind in ("different", "cut"):
             self._part(own, is_here=edit.kind == "cut")
         elif edit.kind == "clutter":
             self._drop(own[0])
         elif edit.kind == "name":
             self._call(own[0], edit.name)
-        elif edit.kind == "reassign":
-            self._reassign(own)
+        elif edit.kind in REASSIGN:
+            self._reassign(own, is_even=edit.kind == "reassign_even")
         if edit.kind in ("same", "name"):
             self._collect(int(self.labels[own[0]]))
 
@@ -119,9 +130,32 @@ class Solver:
             if self.names[b] is not None:
                 self.names[a], self.names[b] = self.names[b], None
             return
-        self._carry_out(
-            self._solve(own[1], b, a, beside=own[0]), self._solve(own[0], a, b, beside=own[1])
-        )
+        ways = [(own[1], b, a, own[0]), (own[0], a, b, own[1])]
+        is_stated = [i in self._constraints.pinned for i in own]
+        if is_stated[0] != is_stated[1]:  # what was stated stays
+            ways = [ways[is_stated[1]]]
+        self._carry_out(*(self._solve(*each[:3], beside=each[3]) for each in ways))
+
+    def _move(self, one: int, first: int, last: int) -> None:
+        """Bring the detections of a track from one to another to a third one's, in exchange."""
+        labels, frame = self.labels, self._d.frame_of
+        source, target = int(labels[first]), int(labels[one])
+        if target < 0:
+            labels[one] = target = self._new_track()
+        inside = (frame >= frame[first]) & (frame <= frame[last])
+        moved = [first, last]
+        if source >= 0:
+            moved = np.flatnonzero(inside & (labels == source)).tolist()
+        there = np.flatnonzero(inside & (labels == target) & np.isin(frame, frame[moved]))
+        stated = self._constraints
+        if (
+            not {first, last} <= set(moved)
+            or stated.pinned & set(there.tolist())
+            or not all(stated.group(i) <= {*moved, *stated.group(one)} for i in moved)
+            or not all(self._may_be(i, target) for i in moved)
+        ):
+            raise NoSolution
+        labels[there], labels[moved] = source, target
 
     def _may_be_one(self, one: int, other: int) -> bool:
         """Return whether the tracks of two detections may be of one marker as a whole.
@@ -349,8 +383,11 @@ class Solver:
         _, first = np.unique(frame[others], return_index=True)  # the most probable of each frame
         labels[others[first]] = track
 
-    def _reassign(self, kept: Sequence[int]) -> None:
-        """Assign the uncertain detections and those without a track once more, without some."""
+    def _reassign(self, kept: Sequence[int], *, is_even: bool) -> None:
+        """Assign the uncertain detections and those without a track once more, without some.
+
+        With even odds, changes that depend on each other are made if they gain together.
+        """
         tracks = Tracks(detections=self._d, labels=self.labels, names=tuple(self.names))
         assessed = settled(
             assess(tracks, self._model, self._stitching), self._constraints.edits
@@ -359,13 +396,20 @@ class Solver:
         is_open = (self.labels >= 0) & (assessed < UNCERTAIN) | self._free()
         is_open[[*self._constraints.pinned, *self._constraints.kept, *kept]] = False
         labels, is_placed = with_lost_segments(tracks, is_open)
-        tracks, is_open = replace(tracks, labels=labels), is_open & ~is_placed
-        labels = reassigned(tracks, is_open, self.evidence.ghost, self._model.sensor.noise_sigma)
+        ghost, noise_sigma = self.evidence.ghost, self._model.sensor.noise_sigma
+        placed = replace(tracks, labels=labels)
+        rounds = EVEN_ODDS if is_even else ROUNDS
+        labels = reassigned(placed, is_open & ~is_placed, ghost, noise_sigma, rounds)
         # Without distances at its best, a marker is no clutter: its identity must be improbable.
         slots = self._d.frame_of * len(self.names)
         is_back = (self.labels >= 0) & (labels < 0) & (assessed > 1 - UNCERTAIN)
         is_back &= ~np.isin(slots + self.labels, (slots + labels)[labels >= 0])
-        self.labels = np.where(is_back, self.labels, labels)
+        labels = np.where(is_back, self.labels, labels)
+        if is_even:
+            odds = gains(tracks, labels, ghost, noise_sigma)
+            odds[is_placed] = PROBABLE  # at least, by the distances among them
+            labels = without_improbable(self.labels, labels, odds, self._d.frame_of)
+        self.labels = labels
 
     def _free(self) -> NDArray[np.bool_]:
         """Return which detections have no track, without those that an edit is about.
