@@ -311,12 +311,12 @@ def _with_reason(best: Uncorrected, first: Uncorrected) -> Uncorrected:
 
 
 def _reassigned(found: Uncorrected) -> Uncorrected:
-    """Assign all detections once more and find lost markers, while that makes more certain.
+    """Find lost markers, and assign all detections once more while that makes more certain.
 
     The confidence uses the same distances, so that it is too high afterwards to compare the result
     with another attempt.
     """
-    best = found
+    best = _with_lost_markers(found)
     for _ in range(MAX_ROUNDS):
         if not best.is_doubtful:
             break
