@@ -24,7 +24,7 @@ def without(truth, is_lost):
 
 
 def test_segments_that_were_lost_for_some_frames_are_found(person):
-    lost = ("RELB", "RELM", "RFRM", "RWRA", "RWRB", "RFIN")
+    lost = ("RELB", "RFRM", "RWRA", "RWRB", "RFIN")
     arm = [person.names.index(name) for name in lost]
     is_lost = np.isin(person.labels, arm) & (person.detections.frame_of % 50 < 5)
     tracks = without(person, is_lost)
