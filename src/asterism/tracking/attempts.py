@@ -311,21 +311,20 @@ def _with_reason(best: Uncorrected, first: Uncorrected) -> Uncorrected:
 
 
 def _reassigned(found: Uncorrected) -> Uncorrected:
-    """Find lost markers, and assign all detections once more while that makes more certain.
+    """Assign all detections once more, while that makes more identities certain.
 
     The confidence uses the same distances, so that it is too high afterwards to compare the result
     with another attempt.
     """
-    best = _with_lost_markers(found)
+    best = found
     for _ in range(MAX_ROUNDS):
         if not best.is_doubtful:
             break
-        tracks, noise_sigma = best.tracks, best.model.sensor.noise_sigma
+        tracks = best.tracks
         labels = reassigned(
             tracks, np.ones(len(tracks.labels), dtype=bool), ghost_log_odds(tracks, best.stitching),
-            noise_sigma,
+            best.model.sensor.noise_sigma,
         )  # fmt: skip
-        labels = with_lost_markers(tracks.detections, labels, noise_sigma)
         again = _with_labels(best, labels, int(tracks.info.get("refinements", 0)) + 1)
         if again.expected_right <= best.expected_right:
             break
