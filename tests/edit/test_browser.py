@@ -260,6 +260,7 @@ def test_two_tracks_are_exchanged_between_two_frames(browser, served):
     page.key("z")
     on_disk(page, 0)
     pressed = "document.getElementById('edit-mark').getAttribute('aria-pressed')"
+    page.run("asterism.seek(100)")  # the page went to the next decision
     page.key("h", shift=True)
     assert page.run(pressed) == "true"
     page.run("asterism.seek(104)")
