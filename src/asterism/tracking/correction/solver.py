@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,20 +10,12 @@ import numpy as np
 from asterism.model import Tracks
 from asterism.model.edit import REASSIGN
 from asterism.tracking.confidence.identity import assess
-from asterism.tracking.confidence.reassign import (
-    EVEN_ODDS,
-    PROBABLE,
-    ROUNDS,
-    UNCERTAIN,
-    gains,
-    reassigned,
-)
-from asterism.tracking.correction.change import without_improbable
+from asterism.tracking.confidence.reassign import PROBABLE, UNCERTAIN
+from asterism.tracking.correction.assignment import assigned_again
 from asterism.tracking.correction.constraints import Constraints, detections_of
 from asterism.tracking.correction.continuation import continuation
 from asterism.tracking.correction.evidence import Evidence
 from asterism.tracking.correction.exchange import Lane, Motion, best_exchange
-from asterism.tracking.correction.segments import with_lost_segments
 from asterism.tracking.correction.settled import settled
 
 if TYPE_CHECKING:
@@ -233,8 +224,6 @@ class Solver:
                 target = self._new_track()
                 self._carry_out(self._solve(detection, track, target))
                 track = target
-            self.names[track] = name
-            return
         if named < 0:
             self.names[track] = name
 
@@ -384,10 +373,7 @@ class Solver:
         labels[others[first]] = track
 
     def _reassign(self, kept: Sequence[int], *, is_even: bool) -> None:
-        """Assign the uncertain detections and those without a track once more, without some.
-
-        With even odds, changes that depend on each other are made if they gain together.
-        """
+        """Assign the uncertain detections and those without a track once more, without some."""
         tracks = Tracks(detections=self._d, labels=self.labels, names=tuple(self.names))
         assessed = settled(
             assess(tracks, self._model, self._stitching), self._constraints.edits
@@ -395,21 +381,10 @@ class Solver:
         assert assessed is not None
         is_open = (self.labels >= 0) & (assessed < UNCERTAIN) | self._free()
         is_open[[*self._constraints.pinned, *self._constraints.kept, *kept]] = False
-        labels, is_placed = with_lost_segments(tracks, is_open)
-        ghost, noise_sigma = self.evidence.ghost, self._model.sensor.noise_sigma
-        placed = replace(tracks, labels=labels)
-        rounds = EVEN_ODDS if is_even else ROUNDS
-        labels = reassigned(placed, is_open & ~is_placed, ghost, noise_sigma, rounds)
-        # Without distances at its best, a marker is no clutter: its identity must be improbable.
-        slots = self._d.frame_of * len(self.names)
-        is_back = (self.labels >= 0) & (labels < 0) & (assessed > 1 - UNCERTAIN)
-        is_back &= ~np.isin(slots + self.labels, (slots + labels)[labels >= 0])
-        labels = np.where(is_back, self.labels, labels)
-        if is_even:
-            odds = gains(tracks, labels, ghost, noise_sigma)
-            odds[is_placed] = PROBABLE  # at least, by the distances among them
-            labels = without_improbable(self.labels, labels, odds, self._d.frame_of)
-        self.labels = labels
+        noise_sigma = self._model.sensor.noise_sigma
+        self.labels = assigned_again(
+            tracks, assessed, is_open, self.evidence.ghost, noise_sigma, is_even=is_even
+        )
 
     def _free(self) -> NDArray[np.bool_]:
         """Return which detections have no track, without those that an edit is about.
