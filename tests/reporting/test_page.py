@@ -342,6 +342,13 @@ def test_a_single_uncertain_detection_is_part_of_the_nearest_place():
     assert places_of(uncertain(*small, n_frames=600)) == ()
 
 
+def test_a_single_detection_that_is_almost_surely_wrong_is_a_place():
+    from asterism.reporting.places import places_of
+
+    (place,) = places_of(uncertain((1, 60, 60, 0.15, []), (2, 280, 280, 0.25, []), n_frames=600))
+    assert place.tracks == (1,)
+
+
 def test_parts_that_may_as_well_be_right_are_no_place_of_their_own():
     from asterism.reporting.places import places_of
 
