@@ -54,6 +54,7 @@ class InTime:
         self.name, self.rate, self.waits = "two people", RATE, False
         self.faults: dict[str, int] = {}
         self._frames, self._begin = back_and_forth(d), time.perf_counter()
+        self._next = next(self._frames)
 
     def open(self) -> None:
         """Begin now."""
@@ -62,11 +63,14 @@ class InTime:
     def close(self) -> None:
         """Do nothing."""
 
-    def receive(self, timeout: float) -> SourceFrame:
-        """Wait for the next frame."""
-        del timeout
-        n, points = next(self._frames)
-        time.sleep(max(0.0, self._begin + n / RATE - time.perf_counter()))
+    def receive(self, timeout: float) -> SourceFrame | None:
+        """Wait for the next frame, at most for some seconds."""
+        n, points = self._next
+        wait = self._begin + n / RATE - time.perf_counter()
+        time.sleep(max(0.0, min(wait, timeout)))
+        if wait > timeout:
+            return None
+        self._next = next(self._frames)
         return SourceFrame(number=n, time=n / RATE, points=points, received=time.perf_counter())
 
 

@@ -349,11 +349,11 @@ def test_a_single_detection_that_is_almost_surely_wrong_is_a_place():
     assert place.tracks == (1,)
 
 
-def test_parts_that_may_as_well_be_right_are_no_place_of_their_own():
+def test_parts_that_are_probably_right_are_no_place_of_their_own():
     from asterism.reporting.places import places_of
 
-    wrong, even = (0, 100, 120, 0.45, []), [(1, 60, 90, 0.55, []), (2, 300, 399, 0.55, [])]
-    (place,) = places_of(uncertain(wrong, *even, n_frames=600))
+    wrong, probable = (0, 100, 120, 0.45, []), [(1, 60, 90, 0.75, []), (2, 300, 399, 0.75, [])]
+    (place,) = places_of(uncertain(wrong, *probable, n_frames=600))
     assert set(place.tracks) == {0, 1}
     assert (place.first, place.last) == (60, 120)
 

@@ -23,9 +23,9 @@ UNCERTAIN, UNCERTAIN_NAME = 0.9, 0.8
 MIN_EXPECTED = 0.8
 """Smallest expected number of wrong detections of a place: less than one, so that a single
 detection that is almost surely wrong is one."""
-WRONG = 0.5
-"""Probability below which an identity or a join of a place must be: one that is more probably wrong
-than right. Other uncertain parts are added to the nearest place."""
+DOUBTED = 0.7
+"""Probability below which an identity or a join of a place must be. Other uncertain parts are added
+to the nearest place."""
 NEAR_SECONDS = 0.5
 """Time within which uncertain parts of a track, or of two that may be exchanged, are one place, and
 within which less uncertain ones are added to a place."""
@@ -99,7 +99,7 @@ def places_of(tracks: Tracks) -> tuple[Place, ...]:
         Identities and joins of a probability below 0.9, and names below 0.8. One place are parts of
         one track that follow each other, parts of two tracks that may be exchanged, and long parts
         of several tracks at one time, as of a subject that walks out and in again. A place has a
-        name, or a part or join with a probability below 0.5, and at least 0.8 expected wrong
+        name, or a part or join with a probability below 0.7, and at least 0.8 expected wrong
         detections. Other uncertain parts are in the nearest place within half a second.
 
     Examples
@@ -157,7 +157,7 @@ def _with_rest(places: list[Place], times: NDArray[np.float64]) -> Iterator[Plac
 
 def _needs_look(place: Place) -> bool:
     return place.expected_wrong >= MIN_EXPECTED and any(
-        each.kind == "name" or (each.probability is not None and each.probability < WRONG)
+        each.kind == "name" or (each.probability is not None and each.probability < DOUBTED)
         for each in place.decisions
     )
 
