@@ -38,8 +38,7 @@ LISTED = 20
 FEW = 15
 NEAR_SECONDS = 0.5
 """Longest time from a place to a switch that it lists."""
-SEEDS = (31, 32)
-"""Of simulated people."""
+PEOPLE, SEEDS = "simulated people", (31, 32)
 CAPTURE_SEEDS = range(1, 10)
 
 
@@ -114,10 +113,7 @@ def main() -> None:
             made = make(seed)
             for name, corrupt in CORRUPTED.items():
                 truth = corrupt(made, seed)
-                own, tracks = (
-                    groups.setdefault("simulated people", Group()),
-                    am.track(truth.detections),
-                )
+                tracks, own = am.track(truth.detections), groups.setdefault(PEOPLE, Group())
                 own.add(tracks, wrong_runs(tracks, truth))
                 print(scene, seed, name, flush=True)
     for path in captures(options.data):

@@ -352,7 +352,7 @@ def test_a_single_detection_that_is_almost_surely_wrong_is_a_place():
 def test_parts_that_are_probably_right_are_no_place_of_their_own():
     from asterism.reporting.places import places_of
 
-    wrong, probable = (0, 100, 120, 0.45, []), [(1, 60, 90, 0.75, []), (2, 300, 399, 0.75, [])]
+    wrong, probable = (0, 100, 120, 0.65, []), [(1, 60, 90, 0.75, []), (2, 300, 399, 0.75, [])]
     (place,) = places_of(uncertain(wrong, *probable, n_frames=600))
     assert set(place.tracks) == {0, 1}
     assert (place.first, place.last) == (60, 120)

@@ -23,9 +23,9 @@ UNCERTAIN, UNCERTAIN_NAME = 0.9, 0.8
 MIN_EXPECTED = 0.8
 """Smallest expected number of wrong detections of a place: less than one, so that a single
 detection that is almost surely wrong is one."""
-PROBABLE = 0.7
-"""Probability of an identity or a join from which it is no place of its own. It is added to the
-nearest place, if it is uncertain."""
+OWN_PLACE = 0.7
+"""Probability below which an identity or a join is a place of its own. Other uncertain ones are
+added to the nearest place."""
 NEAR_SECONDS = 0.5
 """Time within which uncertain parts of a track, or of two that may be exchanged, are one place, and
 within which less uncertain ones are added to a place."""
@@ -157,7 +157,7 @@ def _with_rest(places: list[Place], times: NDArray[np.float64]) -> Iterator[Plac
 
 def _needs_look(place: Place) -> bool:
     return place.expected_wrong >= MIN_EXPECTED and any(
-        each.kind == "name" or (each.probability is not None and each.probability < PROBABLE)
+        each.kind == "name" or (each.probability is not None and each.probability < OWN_PLACE)
         for each in place.decisions
     )
 

@@ -16,6 +16,7 @@ from asterism.tracking.correction.constraints import Constraints, detections_of
 from asterism.tracking.correction.continuation import continuation
 from asterism.tracking.correction.evidence import Evidence
 from asterism.tracking.correction.exchange import Lane, Motion, best_exchange
+from asterism.tracking.correction.lanes import CLUTTER, Lanes
 from asterism.tracking.correction.settled import settled
 
 if TYPE_CHECKING:
@@ -30,10 +31,6 @@ __all__ = ["NoSolution", "Solver"]
 
 CANDIDATES = 3
 """Number of other tracks that are considered for a part that leaves its track."""
-CLUTTER = -2
-"""Label, while an edit is solved, of the detections without a track that one of them begins."""
-TRACKED = 3.0
-"""Log odds of a detection that continues a track being of its marker instead of clutter."""
 MAX_SHARED = 0.1
 """Largest share of the frames of a track that a track of the same marker may have too."""
 
@@ -65,7 +62,7 @@ class Solver:
     ) -> None:
         self._d, self._model, self._stitching = tracks.detections, model, stitching
         self.evidence = Evidence(tracks, model, stitching)
-        self._motion = Motion(self._d, model)
+        self._motion, self._lanes = Motion(self._d, model), Lanes(self._d, self.evidence)
         self.labels = tracks.labels.copy()
         self.names = list(tracks.names)
         self._constraints = Constraints(self._d)
@@ -174,7 +171,7 @@ class Solver:
         later = max(own, key=lambda i: self._d.frame_of[i])
         cut = int(self._d.frame_of[later]) if is_here else None
         targets = [[*self.evidence.best(i, self.labels, CANDIDATES), len(self.names)] for i in own]
-        lanes = self._lanes(a, list(dict.fromkeys(itertools.chain(*targets))), self.labels)
+        lanes = self._lanes.between(a, list(dict.fromkeys(itertools.chain(*targets))), self.labels)
         for detection, beside, others in zip(own, reversed(own), targets, strict=True):
             found += [
                 self._solve(detection, a, other, cut, beside=beside, lanes=lanes[other])
@@ -257,11 +254,11 @@ class Solver:
             return None
         is_new = target == len(self.names)
         if lanes is None or is_new:
-            lanes = lanes or self._lanes(source, [target], self.labels)[target]
+            lanes = lanes or self._lanes.between(source, [target], self.labels)[target]
             part = int(self.evidence.part_of[detection])
             gain = lanes[0].gains[self.evidence.part_of[lanes[0].detections] == part].sum()
             if source != CLUTTER and self._fits_alone(detection, gain, target):
-                lanes = self._track_lanes(source, [target], self.labels, part)[0], lanes[1]
+                lanes = self._lanes.of(source, [target], self.labels, part)[0], lanes[1]
         group = self._constraints.group(detection)
         both = group if beside is None else {*group, beside}
         own = np.array(sorted(self._constraints.pinned | both))
@@ -285,50 +282,6 @@ class Solver:
         """
         own = np.array([detection])
         return gain < 0 < self.evidence.gains(own, own, self.labels, [target])[0, 0]
-
-    def _lanes(
-        self, source: int, targets: Sequence[int], labels: NDArray[np.int64]
-    ) -> dict[int, tuple[Lane, Lane]]:
-        """Return the lanes of a track and of each of several others, nothing stated."""
-        out = self._track_lanes(source, targets, labels)
-        return {
-            target: (lane, self._track_lanes(target, [source], labels)[0])
-            for target, lane in zip(targets, out, strict=True)
-        }
-
-    def _track_lanes(
-        self,
-        track: int,
-        others: Sequence[int],
-        labels: NDArray[np.int64],
-        mixed: int | None = None,
-    ) -> list[Lane]:
-        """Return the lane of a track for an exchange with each of several others.
-
-        Each detection of a mixed part is a part of its own.
-        """
-        evidence, own = self.evidence, np.flatnonzero(labels == track)
-        parts = evidence.part_of[own]
-        if mixed is not None:
-            inside = np.flatnonzero(parts == mixed)
-            parts[inside[1:]] = -1 - np.arange(1, len(inside))
-        starts = np.ones(len(own), dtype=bool)
-        starts[1:] = parts[1:] != parts[:-1]
-        before = np.ones(len(own))
-        known = starts & (parts >= 0) & (parts < len(evidence.before))
-        before[known] = evidence.before[parts[known]]
-        gains = (
-            np.full((len(others), len(own)), TRACKED if track == CLUTTER else -TRACKED)
-            if CLUTTER in (track, *others)
-            else evidence.gains(own, parts, labels, others)
-        )
-        return [
-            Lane(
-                detections=own, frames=self._d.frame_of[own], gains=gain, starts=starts,
-                before=before, stated=np.zeros(len(own), dtype=np.int8),
-            )
-            for gain in gains
-        ]  # fmt: skip
 
     def _carry_out(self, *solutions: _Solution | None) -> None:
         """Make the moves with the largest gain."""
