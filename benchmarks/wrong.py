@@ -1,12 +1,13 @@
 """Wrong detections of tracks, by the labels of a file and where these are wrong themselves.
 
 Where a track and the labels of a file differ, one of both is wrong. A run of detections that a
-track holds under another label is an error of the file in three cases. All markers concerned are
-within millimetres of each other, so that nothing shows which is which. Or the motion of the track
-is continuous at the ends of the run from one frame to the next, where the labels of the file jump;
-at deviations of centimetres the distances must favour the track too. Or the distances to the other
-labels are clearly those of the marker of the track, not those of the label. A run is judged as a
-whole, and then each stretch of it under one label.
+track holds under another label is an error of the file in four cases. All markers concerned are
+within millimetres of each other, so that nothing shows which is which. Or the cameras have merged
+two markers, so that one of them is missed and the detection is in the middle. Or the motion of the
+track is continuous at the ends of the run from one frame to the next, where the labels of the file
+jump; at deviations of centimetres the distances must favour the track too. Or the distances to the
+other labels are clearly those of the marker of the track, not those of the label. A run is judged
+as a whole, and then each stretch of it under one label.
 """
 
 from __future__ import annotations
@@ -27,6 +28,8 @@ Indices = NDArray[np.int64]
 
 NEXT = 2
 """Largest number of frames from one detection to the next at which motion is compared."""
+MAX_GAP = 10
+"""Largest number of frames without a detection of the track in which the labels may change."""
 CONTINUOUS = 0.005
 """Deviation from straight motion, metres, within which motion is continuous."""
 RELATIVE, JUMP = 0.35, 0.01
@@ -34,6 +37,8 @@ RELATIVE, JUMP = 0.35, 0.01
 metres."""
 SAME_PLACE = 0.003
 """Distance of two detections, metres, within which nothing shows which of them is which marker."""
+MERGED = 0.25
+"""Largest distance of a detection of two merged markers from their middle, relative to theirs."""
 MIN_REFERENCES, MAX_REFERENCES = 4, 8
 MIN_FRAMES = 8
 """Smallest number of frames of a distance."""
@@ -143,8 +148,10 @@ class Labels:
             Label of most detections of the track.
         """
         run = own[begin:end]
-        if self._is_same_place(run, marker) or self._is_continuous(
-            own, begin, end, marker, CONTINUOUS
+        if (
+            self._is_same_place(run, marker)
+            or self._is_merged(run, marker)
+            or self._is_continuous(own, begin, end, marker, CONTINUOUS)
         ):
             return True
         ratio = self._least_ratio(run, marker)
@@ -155,6 +162,25 @@ class Labels:
     def _is_same_place(self, run: Indices, marker: int) -> bool:
         apart = self.points[run] - self.dense[self.frame[run], marker]
         return bool((np.linalg.norm(apart, axis=1) < SAME_PLACE).all())
+
+    def _is_merged(self, run: Indices, marker: int) -> bool:
+        """Return whether the marker is missed, and both are on either side where they separate."""
+        if not np.isnan(self.dense[self.frame[run], marker]).all():
+            return False
+        votes: list[bool] = []
+        for i, way in ((run[0], 1), (run[-1], -1)):
+            at, pair = int(self.frame[i]), [marker, int(self.labels[i])]
+            for outside in range(at - way, at - way * (NEXT + 1), -way):
+                if not 0 <= outside < len(self.dense) or np.isnan(self.dense[outside, pair]).any():
+                    continue
+                one, other = (
+                    self.dense[outside, k] + (at - outside) * self._velocity(k, outside, -way)
+                    for k in pair
+                )
+                off = _lengths(self.points[i] - (one + other) / 2)
+                votes.append(bool(off < MERGED * _lengths(one - other)))
+                break
+        return bool(votes) and all(votes)
 
     def _is_continuous(self, own: Indices, begin: int, end: int, marker: int, most: float) -> bool:
         """Return whether the motion is continuous where the labels change, before and after."""
@@ -172,11 +198,15 @@ class Labels:
     def _links(
         self, outside: int, inside: int, marker: int, label: int
     ) -> Iterator[tuple[float, float]]:
-        """Yield the deviations of links from one label to the other, and those of the file.
+        """Yield the deviations of links from one label to the other, and the least of other links.
 
-        The labels may change anywhere from the last detection outside a run to the first inside.
+        Others are those from the first detection to the other ones of the next frame, among them
+        those by the labels of the file, and those to the second from the other ones. The labels may
+        change anywhere from the last detection outside a run to the first inside.
         """
         way = 1 if inside > outside else -1
+        if (inside - outside) * way > MAX_GAP:
+            return
         seen = [
             [f for f in range(outside, inside + way, way) if not np.isnan(self.dense[f, k]).any()]
             for k in (marker, label)
@@ -186,15 +216,14 @@ class Labels:
             if not 0 < n <= NEXT:
                 continue
             before, after = self._velocity(marker, a, -way), self._velocity(label, b, way)
-            # The same link by the labels of the file: where the marker of the track goes on, and
-            # where that of the run comes from.
             begin, end = self.dense[a, marker], self.dense[b, label]
-            kept, *jumps = (
-                min(_length(link - n * way * v) for v in (before, after))
-                for link in (end - begin, self.dense[b, marker] - begin, end - self.dense[a, label])
-                if not np.isnan(link).any()
-            )
-            yield kept, min(jumps, default=CONTINUOUS / RELATIVE)
+            links = np.concatenate(
+                [[end - begin],
+                 np.delete(self.dense[b], label, axis=0) - begin,
+                 end - np.delete(self.dense[a], marker, axis=0)]
+            )  # fmt: skip
+            off = np.minimum(*(_lengths(links - n * way * v) for v in (before, after)))
+            yield float(off[0]), float(np.nanmin(off[1:], initial=np.inf))
 
     def _velocity(self, label: int, frame: int, way: int) -> Array:
         """Return the motion of a label a frame, from a frame to the next one in a direction."""
@@ -241,8 +270,8 @@ class Labels:
         return median, np.maximum(deviation, SAME_PLACE + 0.02 * median)
 
 
-def _length(v: Array) -> float:
-    return float(np.linalg.norm(v))
+def _lengths(v: Array) -> Array:
+    return np.linalg.norm(v, axis=-1)
 
 
 def _median(d: Array) -> Array:

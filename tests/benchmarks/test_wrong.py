@@ -80,6 +80,40 @@ def test_two_markers_in_one_place_are_no_switch():
     assert {run.kind for run in wrong_runs(exchanged(truth), truth)} == {"label error"}
 
 
+@pytest.mark.parametrize(("share", "kind"), [(0.5, "label error"), (0.2, "switch")])
+def test_a_blob_of_two_merged_markers_is_either(share, kind):
+    truth = am.simulate.person(frames=300, n_markers=40, seed=2)
+    positions = truth.positions()
+    one, other = PAIR
+    at = np.arange(FIRST, FIRST + 4)
+    positions[at, one] += share * (positions[at, other] - positions[at, one])
+    positions[at, other] = np.nan
+    truth = am.Tracks.from_dense(truth.detections.times, positions)
+    inside = np.isin(truth.detections.frame_of, at) & (truth.labels == one)
+    labels = np.where(inside, other, truth.labels).astype(truth.labels.dtype)
+    runs = wrong_runs(replace(truth, labels=labels), truth)
+    assert [(run.track, run.kind) for run in runs] == [(other, kind)]
+
+
+def test_labels_that_change_in_a_long_gap_are_judged_at_the_other_end():
+    """In the gap are pieces of both, which do not continue each other; no distances show more."""
+    made = am.simulate.person(frames=300, n_markers=40, seed=2).positions()[:, [*PAIR, 0, 1]]
+    positions = made.copy()
+    positions[FIRST - 40 : FIRST, :2] = np.nan
+    for marker, first in ((0, FIRST - 30), (1, FIRST - 28)):
+        positions[first : first + 2, marker] = made[first : first + 2, marker]
+    truth = am.Tracks.from_dense(np.arange(300) / 100, positions)
+    frame, labels = truth.detections.frame_of, truth.labels.copy()
+    inside = (frame >= FIRST) & (frame <= LAST) & (labels < 2)
+    labels[inside] = 1 - labels[inside]
+    in_gap = (frame >= FIRST - 40) & (frame < FIRST)
+    found = np.where(in_gap, -1, truth.labels).astype(labels.dtype)
+    runs = wrong_runs(replace(truth, labels=found), replace(truth, labels=labels))
+    assert [(run.track, run.first, run.kind) for run in runs] == [
+        (marker, FIRST, "label error") for marker in (0, 1)
+    ]  # fmt: skip
+
+
 def test_labels_are_judged_as_in_the_file():
     """Of the labels of every third frame, one is wrong, and the detections before are missed."""
     file = am.simulate.person(activity="run", frames=300, n_markers=40, seed=2)
