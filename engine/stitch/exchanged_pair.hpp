@@ -116,14 +116,16 @@ class ExchangedPair {
     const std::int32_t K = all_.n_tracks();
     const double least = kMinPresent * static_cast<double>(all_.n_frames());
     near_.clear();
+    double beyond = UsualDistances::kUnknown;  // of what is not among the nearest
     for (std::int32_t r = 0; r < K; ++r) {
       const double far = std::max(all_.usual(one_, r), all_.usual(other_, r));
-      const auto n = static_cast<double>(all_.frames(r).size());
-      if (r != one_ && r != other_ && far < UsualDistances::kUnknown && n > least)
-        near_.emplace_back(far, r);
+      if (!(far < beyond) || r == one_ || r == other_) continue;
+      if (static_cast<double>(all_.frames(r).size()) <= least) continue;
+      near_.insert(std::ranges::upper_bound(near_, std::pair(far, r)), {far, r});
+      if (near_.size() <= kCandidates) continue;
+      near_.pop_back();
+      beyond = near_.back().first;
     }
-    std::ranges::sort(near_);
-    near_.resize(std::min(near_.size(), kCandidates));
     references_.clear();
     for (const auto& [far, r] : near_) references_.push_back(r);
     return references_.size() > kMinReferences;

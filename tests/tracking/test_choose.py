@@ -19,6 +19,7 @@ from asterism.tracking.attempts import (
     Uncorrected,
     _has_bonds,
     _reassigned,
+    _settled,
     attempt,
     exchanged_by_spreads,
     most_certain,
@@ -156,7 +157,7 @@ def test_detections_of_a_doubtful_result_are_assigned_again(monkeypatch):
     monkeypatch.setattr(name, lambda found: made.append(found) or found)
     am.track(truth.detections)
     monkeypatch.undo()
-    (before,) = made
+    before = made[0]
     after = _reassigned(before)
     assert after.expected_right > before.expected_right
     assert am.evaluate(after.tracks, truth).idf1 > am.evaluate(before.tracks, truth).idf1 + 0.005
@@ -168,7 +169,7 @@ def test_detections_of_a_doubtful_result_are_assigned_again(monkeypatch):
 def test_ghosts_beside_the_markers_of_a_cube_are_left_alone(monkeypatch):
     made, name = [], "asterism.tracking.attempts._reassigned"
     monkeypatch.setattr(name, lambda found: made.append(found) or found)
-    truths = []
+    truths, firsts = [], []
     for seed in (51, 53, 54):
         cube = am.simulate.cube(frames=400, seed=seed)
         truths.append(
@@ -176,10 +177,12 @@ def test_ghosts_beside_the_markers_of_a_cube_are_left_alone(monkeypatch):
                 cube, burst=am.simulate.Burst(), ghosts=am.simulate.Ghosts(), noise=3e-4, seed=seed
             )
         )
+        made.clear()
         am.track(truths[-1].detections)
+        firsts.append(made[0])
     monkeypatch.undo()
-    assert all(before.is_doubtful for before in made)
-    for before, truth in zip(made, truths, strict=True):
+    assert all(before.is_doubtful for before in firsts)
+    for before, truth in zip(firsts, truths, strict=True):
         after = am.evaluate(_reassigned(before).tracks, truth).idf1
         assert after > am.evaluate(before.tracks, truth).idf1 - 0.001
 
@@ -232,6 +235,14 @@ class Planned(Uncorrected):
         return self.shares[way] * len(self.tracks.labels)
 
 
+class InTurn(Uncorrected):
+    """Tracks of which a share is expected to be right that is theirs."""
+
+    @property
+    def expected_right(self):
+        return self.tracks.info["share"] * len(self.tracks.labels)
+
+
 @pytest.mark.parametrize(("gain", "is_kept"), [(0.001, False), (0.003, True)])
 def test_bonds_must_make_identities_more_certain_by_a_margin(gain, is_kept, monkeypatch):
     walk = am.simulate.person(activity="walk", frames=60, seed=1)
@@ -269,6 +280,27 @@ def test_a_method_with_bonds_needs_no_attempt_without_them(monkeypatch):
     assert made == [("smp", True)]
 
 
+@pytest.mark.parametrize(("has_bonds", "kept"), [(True, 0.9), (False, 0.7)])
+def test_labels_change_until_identities_are_no_more_certain_where_bonds_hold(
+    has_bonds, kept, monkeypatch
+):
+    walk = am.simulate.person(activity="walk", frames=60, seed=1)
+    recipe = am.tracking.plan_tracking(walk.detections).recipe
+    recipe = dataclasses.replace(recipe, options={"rigid": {}} if has_bonds else {})
+    shares = iter([0.7, 0.8, 0.9, 0.85])
+
+    def assigned(found):
+        tracks = dataclasses.replace(walk, info={"share": next(shares)})
+        return dataclasses.replace(found, tracks=tracks)
+
+    monkeypatch.setattr("asterism.tracking.attempts._reassigned", assigned)
+    for name in ("refined_by_own_distances", "exchanged_by_spreads", "_with_lost_markers"):
+        monkeypatch.setattr(f"asterism.tracking.attempts.{name}", lambda found: found)
+    tracks = dataclasses.replace(walk, info={"share": 0.75})
+    found = InTurn(tracks=tracks, recipe=recipe, model=recipe.model)
+    assert _settled(found, found).tracks.info["share"] == kept
+
+
 @pytest.mark.parametrize(
     ("shares", "expected"),
     [
@@ -282,11 +314,6 @@ def test_tomht_alone_or_the_other_motion_is_the_third_attempt(shares, expected, 
     walk = am.simulate.person(activity="walk", frames=60, seed=1)
     recipe = am.tracking.plan_tracking(walk.detections).recipe
     made = []
-
-    class InTurn(Uncorrected):
-        @property
-        def expected_right(self):
-            return self.tracks.info["share"] * len(self.tracks.labels)
 
     def planned(recipe, *_, **__):
         tracks = dataclasses.replace(walk, info={"share": shares[len(made)]})

@@ -55,8 +55,8 @@ attempts."""
 MAX_PASSES = 4
 """Largest number of passes over the capture."""
 MAX_ROUNDS = 4
-"""Largest number of marker sets that are learnt from the tracks, each from the tracks that the one
-before has named."""
+"""Largest number of times that labels are changed by distances learnt from the tracks, each time
+from those of the time before."""
 PRESENT = 0.3
 """Smallest share of the frames in which a marker of such a set is detected."""
 MARKERS = range(4, 201)
@@ -191,12 +191,10 @@ def most_certain(
     The first is by the method of the recipe. The others are by `TOMHT`: with `Rigidity` and the
     motion of `fit_body_motion`, and without, unless bonds are better or the first has some. That
     with bonds must be more certain by `DOUBTFUL`, because it uses distances as the confidence does.
-    Then further passes follow (`next_pass`), until one is not more certain, and an attempt with the
-    motion in tracks of single frames. Every result is `refined_by_own_distances`. At the end all
-    detections of tracks with bonds are assigned once more, tracks take lone detections and those of
-    lost markers, and tracks that have each other's marker are exchanged back
-    (`exchanged_by_spreads`). For `progress`, the
-    first method is half of the work, and every other attempt or pass half of what is left.
+    Then further passes follow (`next_pass`), until one is not more certain. The best is `_settled`.
+    If it has bonds and identities are still uncertain, so is an attempt with the motion in tracks
+    of single frames, and the more certain of both is the result. For `progress`, the first method
+    is half of the work, and every other attempt or pass half of what is left.
 
     Parameters
     ----------
@@ -227,17 +225,44 @@ def most_certain(
         if best is first and not _has_bonds(recipe):
             best = _more_certain(first, _by(TOMHT(), recipe, detections, half_of_rest()), 0)
         has_bodies = best is bodies
-        best = _after_passes(refined_by_own_distances(best), half_of_rest)
+        best = _settled(_after_passes(refined_by_own_distances(best), half_of_rest), first)
         if has_bodies and best.is_doubtful:
             bodies = _by_bonds(recipe, detections, GNN(rigid=Rigidity()), half_of_rest())
             assert bodies is not None
-            best = _more_certain(best, refined_by_own_distances(bodies), 0)
+            best = _more_certain(best, _settled(refined_by_own_distances(bodies), first), 0)
     else:
-        best = refined_by_own_distances(first)
+        best = _settled(refined_by_own_distances(first), first)
     if progress is not None:
         progress(n)
-    best = _with_lone_detections(_reassigned(_with_reason(best, first)))
-    return exchanged_by_spreads(_with_lost_markers(best))
+    return best
+
+
+def _settled(found: Uncorrected, first: Uncorrected) -> Uncorrected:
+    """Change labels by the distances that tracks keep, and state the reason for the result.
+
+    All detections of tracks with bonds are assigned once more, tracks take lone detections and
+    those of lost markers, and tracks that have each other's marker are exchanged back
+    (`exchanged_by_spreads`). That is repeated while it makes more identities certain, where the
+    method has bonds. Where bonds do not make the identities of a capture more certain, its
+    distances vary too much.
+
+    Parameters
+    ----------
+    found : Uncorrected
+        Tracks without names, `refined_by_own_distances`.
+    first : Uncorrected
+        Result of the first attempt.
+    """
+    best = _with_reason(found, first)
+    for n in range(MAX_ROUNDS):
+        again = _with_lost_markers(_with_lone_detections(_reassigned(best)))
+        again = exchanged_by_spreads(again)
+        if n > 0 and again.expected_right <= best.expected_right:
+            break
+        best = again
+        if not best.is_doubtful or not _has_bonds(best.recipe):
+            break
+    return best
 
 
 def _after_passes(best: Uncorrected, begin: Callable[[], Callable[[int], Any]]) -> Uncorrected:
@@ -314,7 +339,7 @@ def _reassigned(found: Uncorrected) -> Uncorrected:
     """Assign all detections once more, while that makes more identities certain.
 
     The confidence uses the same distances, so that it is too high afterwards to compare the result
-    with another attempt.
+    with one that was not assigned once more.
     """
     best = found
     for _ in range(MAX_ROUNDS):

@@ -82,7 +82,7 @@ def with_lone_detections(found: Stitching, model: TrackingModel) -> Stitching:
     confidence = None if tracks.confidence is None else tracks.confidence.copy()
     if confidence is not None:
         confidence[lone] = 1 / (1 + np.exp(-log_odds[taken]))
-    info = {**tracks.info, "lone": len(lone)}
+    info = {**tracks.info, "lone": int(tracks.info.get("lone", 0)) + len(lone)}
     tracks = dataclasses.replace(tracks, labels=labels, confidence=confidence, info=info)
     return dataclasses.replace(found, tracks=tracks, tracklets=tracklets)
 
