@@ -54,6 +54,9 @@ def test_the_nearest_detection_in_a_gap_of_one_frame_is_taken(offsets, taken):
     np.testing.assert_array_equal(found.tracklets >= 0, expected >= 0)
     assert found.tracks.info["lone"] == len(taken)
     assert found.joins == before.joins == ()
+    again = with_lone_detections(found, MODEL)
+    np.testing.assert_array_equal(again.tracks.labels, expected)
+    assert again.tracks.info["lone"] == len(taken)
 
 
 def test_a_detection_between_two_gaps_is_taken_by_the_nearer_track():
