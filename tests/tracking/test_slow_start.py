@@ -7,9 +7,10 @@ import dataclasses
 import numpy as np
 
 import asterism as am
-from asterism.tracking.attempts import attempt, next_pass, refined_by_own_distances
+from asterism.tracking.attempts import attempt, next_pass
 from asterism.tracking.estimation import fit_body_motion
 from asterism.tracking.methods import options_of
+from asterism.tracking.own_distances import refined_by_own_distances
 from asterism.tracking.plan import plan_tracking
 from asterism.tracking.slow_start import MAX_FRAMES, SLOWER, after_slow_start, with_slow_start
 

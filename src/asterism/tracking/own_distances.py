@@ -1,0 +1,159 @@
+"""Labels of a result changed by the distances that its tracks keep to each other."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.tracking.confidence.identity import OTHER_JOIN
+from asterism.tracking.confidence.reassign import ghost_log_odds, reassigned
+from asterism.tracking.lone import with_lone_detections
+from asterism.tracking.lost import with_lost_markers
+from asterism.tracking.naming import learn_marker_set, name_tracks
+from asterism.tracking.stitching.exchanged import exchanged_back, with_markers
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from asterism.tracking.uncorrected import Uncorrected
+
+__all__ = ["assigned_again", "exchanged_by_spreads", "refined_by_own_distances"]
+
+MAX_ROUNDS = 4
+"""Largest number of times that labels are changed by distances learnt from the tracks, each time
+from those of the time before."""
+PRESENT = 0.3
+"""Smallest share of the frames in which a marker of such a set is detected."""
+MARKERS = range(4, 201)
+"""Number of markers of such a set. With fewer, distances are ambiguous; the time of naming grows
+with the square of the number."""
+MAX_CELLS = 30_000_000
+"""Largest product of frames and tracks for such a set; positions of so many take 0.7 GB."""
+
+
+def refined_by_own_distances(found: Uncorrected) -> Uncorrected:
+    """Name tracks by marker sets learnt from them, while that makes more identities certain.
+
+    Parts of tracks change to the marker whose distances they keep.
+
+    Parameters
+    ----------
+    found : Uncorrected
+        Tracks without names.
+    """
+    tracks = found.tracks
+    is_present = tracks.lengths >= PRESENT * tracks.detections.n_frames
+    n_cells = tracks.detections.n_frames * tracks.n_tracks
+    if int(is_present.sum()) not in MARKERS or n_cells > MAX_CELLS:
+        return found
+    names = tuple(f"M{k}" if own else None for k, own in enumerate(is_present))
+    named, best = dataclasses.replace(tracks, names=names), found
+    for n in range(1, MAX_ROUNDS + 1):
+        if not best.is_doubtful:
+            break
+        named = name_tracks(named, learn_marker_set(named)).tracks
+        renamed = _with_labels(found, named.labels, n)
+        if renamed.expected_right <= best.expected_right:
+            break
+        best = renamed
+    return best
+
+
+def assigned_again(found: Uncorrected) -> Uncorrected:
+    """Assign all detections once more by the distances that tracks keep, and what follows from it.
+
+    Then tracks take lone detections and those of lost markers, and tracks that have each other's
+    marker are exchanged back (`exchanged_by_spreads`). Where the method has bonds, all of that is
+    repeated while it makes more identities certain. Where bonds do not make the identities of a
+    capture more certain, its distances vary too much.
+
+    Parameters
+    ----------
+    found : Uncorrected
+        Tracks without names, `refined_by_own_distances`.
+    """
+    best = found
+    for n in range(MAX_ROUNDS):
+        again = _with_lost_markers(_with_lone_detections(_reassigned(best)))
+        again = exchanged_by_spreads(again)
+        if n > 0 and again.expected_right <= best.expected_right:
+            break
+        best = again
+        if not best.is_doubtful or not best.has_bonds:
+            break
+    return best
+
+
+def _reassigned(found: Uncorrected) -> Uncorrected:
+    """Assign all detections once more, while that makes more identities certain.
+
+    The confidence uses the same distances, so that it is too high afterwards to compare the result
+    with one that was not assigned once more.
+    """
+    best = found
+    for _ in range(MAX_ROUNDS):
+        if not best.is_doubtful:
+            break
+        tracks = best.tracks
+        labels = reassigned(
+            tracks, np.ones(len(tracks.labels), dtype=bool), ghost_log_odds(tracks, best.stitching),
+            best.model.sensor.noise_sigma,
+        )  # fmt: skip
+        again = _with_labels(best, labels, int(tracks.info.get("refinements", 0)) + 1)
+        if again.expected_right <= best.expected_right:
+            break
+        best = again
+    return best
+
+
+def _with_lone_detections(found: Uncorrected) -> Uncorrected:
+    if found.stitching is None:
+        return found
+    stitching = with_lone_detections(found.stitching, found.model)
+    tracks = dataclasses.replace(stitching.tracks, recipe=found.tracks.recipe)
+    return dataclasses.replace(found, tracks=tracks, stitching=stitching)
+
+
+def _with_lost_markers(found: Uncorrected) -> Uncorrected:
+    """Find markers by their distances where tracks have lost them, if identities are in doubt."""
+    tracks = found.tracks
+    if not found.is_doubtful:
+        return found
+    noise_sigma = found.model.sensor.noise_sigma
+    labels = with_lost_markers(tracks.detections, tracks.labels, noise_sigma)
+    return _with_labels(found, labels, int(tracks.info.get("refinements", 0)))
+
+
+def exchanged_by_spreads(found: Uncorrected) -> Uncorrected:
+    """Exchange tracks back that have each other's marker, if identities are in doubt.
+
+    That includes pairs whose distances to others have the same medians and different spreads. The
+    confidence does not see such an exchange, because it learns the distances of both tracks from
+    all of their detections, the exchanged ones included.
+
+    Parameters
+    ----------
+    found : Uncorrected
+        Tracks without names.
+    """
+    tracks = found.tracks
+    if found.stitching is None or not found.is_doubtful:
+        return found
+    labels, _ = exchanged_back(tracks.detections, tracks.labels, found.model, by_spreads=True)
+    if np.array_equal(labels, tracks.labels):
+        return found
+    return _with_labels(found, labels, int(tracks.info.get("refinements", 0)))
+
+
+def _with_labels(found: Uncorrected, labels: NDArray[np.int64], n: int) -> Uncorrected:
+    """Return a result with other labels; the parts that moved are joins there."""
+    info, stitching = {**found.tracks.info, "refinements": n}, found.stitching
+    if stitching is not None:
+        stitching = with_markers(stitching, labels, np.full(len(labels), OTHER_JOIN))
+        info["joins"] = len(stitching.joins)
+    tracks = dataclasses.replace(found.tracks, labels=labels, names=(), info=info)
+    if stitching is not None:
+        stitching = dataclasses.replace(stitching, tracks=tracks)
+    return dataclasses.replace(found, tracks=tracks, stitching=stitching)

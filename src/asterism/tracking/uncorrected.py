@@ -1,0 +1,77 @@
+"""Tracks before any edit, with what later steps need, and how certain their identities are."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from asterism.records import record
+from asterism.tracking.confidence.identity import (
+    Examined,
+    examine,
+    expected_right,
+    with_confidence,
+)
+
+if TYPE_CHECKING:
+    from asterism.model import Recipe, TrackingModel, Tracks
+    from asterism.tracking.naming import Naming
+    from asterism.tracking.stitching import Stitching
+
+__all__ = ["DOUBTFUL", "Uncorrected"]
+
+DOUBTFUL = 0.002
+"""Share of the detections whose identity is expected to be wrong, from which there are further
+attempts."""
+
+
+@record(eq=False)
+class Uncorrected:
+    """Tracks of a recipe before any edit, with what the later steps need.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Associated, stitched and named tracks.
+    recipe : Recipe
+        Recipe as it was carried out; its method is the one that made the tracks.
+    model : TrackingModel
+        Model with which they were associated.
+    stitching : Stitching, optional
+        Stitching that made them.
+    naming : Naming, optional
+        Names with their probabilities.
+    """
+
+    tracks: Tracks
+    recipe: Recipe
+    model: TrackingModel
+    stitching: Stitching | None = None
+    naming: Naming | None = None
+
+    @cached_property
+    def examined(self) -> Examined:
+        """What the confidence of identities is computed from."""
+        threads = self.recipe.options.get("threads", 1)
+        return examine(self.tracks, self.model, self.stitching, threads=threads)
+
+    @cached_property
+    def assessed(self) -> Tracks:
+        """The tracks with the confidence of their identities."""
+        return with_confidence(self.tracks, self.examined)
+
+    @cached_property
+    def expected_right(self) -> float:
+        """Number of detections whose identity is expected to be right."""
+        return expected_right(self.tracks, self.examined)
+
+    @property
+    def has_bonds(self) -> bool:
+        """Whether the method used the distances between markers."""
+        return self.recipe.options.get("rigid") is not None
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether more than `DOUBTFUL` of the detections are expected to be wrong."""
+        labels = self.tracks.labels
+        return int((labels >= 0).sum()) - self.expected_right > DOUBTFUL * len(labels)
