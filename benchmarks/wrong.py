@@ -29,7 +29,8 @@ Indices = NDArray[np.int64]
 NEXT = 2
 """Largest number of frames from one detection to the next at which motion is compared."""
 MAX_GAP = 10
-"""Largest number of frames without a detection of the track in which the labels may change."""
+"""Largest number of frames from one detection of a track to the next, between which the labels of
+the file may change."""
 CONTINUOUS = 0.005
 """Deviation from straight motion, metres, within which motion is continuous."""
 RELATIVE, JUMP = 0.35, 0.01
@@ -38,7 +39,8 @@ metres."""
 SAME_PLACE = 0.003
 """Distance of two detections, metres, within which nothing shows which of them is which marker."""
 MERGED = 0.25
-"""Largest distance of a detection of two merged markers from their middle, relative to theirs."""
+"""Largest distance from the middle of two markers of a detection of both, relative to the distance
+of the two."""
 MIN_REFERENCES, MAX_REFERENCES = 4, 8
 MIN_FRAMES = 8
 """Smallest number of frames of a distance."""
@@ -164,7 +166,11 @@ class Labels:
         return bool((np.linalg.norm(apart, axis=1) < SAME_PLACE).all())
 
     def _is_merged(self, run: Indices, marker: int) -> bool:
-        """Return whether the marker is missed, and both are on either side where they separate."""
+        """Return whether the detections of a run are of two markers that the cameras merged.
+
+        The marker of the track is missed in all of the run, and the detection at either end is in
+        the middle of where both markers are expected by their motion in the nearest frame outside.
+        """
         if not np.isnan(self.dense[self.frame[run], marker]).all():
             return False
         votes: list[bool] = []

@@ -114,6 +114,22 @@ def test_labels_that_change_in_a_long_gap_are_judged_at_the_other_end():
     ]  # fmt: skip
 
 
+def test_an_exchange_where_two_markers_meet_is_a_switch():
+    """The motion is continuous either way."""
+    t = np.arange(300) / 100
+    along = 1.5 * (t - t[200])
+    positions = np.zeros((300, 2, 3))
+    positions[:, 0, 0] = positions[:, 1, 1] = along
+    positions[:, 1, 2] = 0.002
+    truth = am.Tracks.from_dense(t, positions)
+    exchanged = truth.detections.frame_of >= 200
+    labels = np.where(exchanged, 1 - truth.labels, truth.labels).astype(truth.labels.dtype)
+    runs = wrong_runs(replace(truth, labels=labels), truth)
+    assert {(run.track, run.first, run.kind) for run in runs} == {
+        (0, 200, "switch"), (1, 200, "switch")
+    }  # fmt: skip
+
+
 def test_labels_are_judged_as_in_the_file():
     """Of the labels of every third frame, one is wrong, and the detections before are missed."""
     file = am.simulate.person(activity="run", frames=300, n_markers=40, seed=2)
