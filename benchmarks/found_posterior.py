@@ -24,7 +24,7 @@ NEAR = 1.0
 
 def log_posterior(tracks: am.Tracks, model: am.TrackingModel) -> float:
     """Return the log posterior of tracks, cut at the gaps that the model excludes."""
-    whole = am.metrics.oracle_tracks(tracks, model.population.max_gap + 1)
+    whole = am.metrics.oracle_tracks(tracks, model.population.max_gap)
     scores = am.model.track_scores(whole, model)
     return float(scores[np.isfinite(scores)].sum())
 
