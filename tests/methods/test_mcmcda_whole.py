@@ -62,6 +62,24 @@ def test_fragments_are_repaired(window):
     assert am.evaluate(kept, am.metrics.oracle_tracks(truth, model.population.max_gap)).idf1 > 0.99
 
 
+@pytest.mark.parametrize("seed", [2, 3, 7])
+@pytest.mark.parametrize(("activity", "missing"), [("walk", 0.1), ("run", 0.2)])
+def test_initial_tracks_keep_what_is_improbable_until_more_detections_follow(
+    activity, missing, seed
+):
+    """Of a running person many tracks begin with a gap; of a walking one some jolt."""
+    truth = am.simulate.person(activity=activity, frames=80, seed=seed)
+    truth = am.simulate.corrupt(truth, missing=missing, clutter=0.1, noise=3e-4, seed=seed)
+    model = am.tracking.tracklet_model(am.estimate_model(truth.detections).model)
+    start = am.metrics.oracle_tracks(truth, model.population.max_gap)
+    tracks = am.track(truth.detections, am.MCMCDA(), model=model, start=start, stitch=False)
+    if not tracks.info["refused_links"]:
+        before = am.log_posterior(start, model)
+        assert tracks.info["log_posterior"] >= before - 1e-6
+    first = np.unique(start.labels, return_index=True)[1][1:]  # without clutter
+    assert (tracks.labels[first] >= 0).all()
+
+
 @pytest.mark.parametrize("window", [10, None])
 def test_without_a_move_and_a_start_nothing_could_begin(window):
     # Every detection would be clutter, without a message.

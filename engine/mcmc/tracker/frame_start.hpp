@@ -43,7 +43,7 @@ class FrameStart {
 
   void give(GivenLabels labels) {
     given_ = std::make_shared<const GivenLabels>(std::move(labels));
-    last_.clear();
+    before_.clear();
   }
 
   // Adds the detections of the newest frame to the tracks of the partition, and its ambiguous
@@ -68,7 +68,7 @@ class FrameStart {
           ambiguous.add(p.last(s_.rows[c.row]), ids[c.column]);
     for (std::int32_t r = 0; r < n_rows; ++r) {
       const std::int32_t j = s_.match[r];
-      if (j < 0 || (!has_assignment_ && s_.row_given[j] != r)) continue;
+      if (j < 0 || s_.is_continued[r] || (!has_assignment_ && s_.row_given[j] != r)) continue;
       Edit<Filter>& edit = next_edit();
       edit.track = s_.rows[r];
       edit.keep = p.track(edit.track).size();
@@ -89,7 +89,7 @@ class FrameStart {
  private:
   static constexpr std::int32_t kNone = -1, kNewTrack = -2;
   static constexpr std::size_t kBlock = 128;  // tracks; fewer take less time than a thread's start
-  struct Last {
+  struct Given {
     std::int32_t detection = -1;
     std::int64_t number = -1;
   };
@@ -107,11 +107,23 @@ class FrameStart {
     }
   }
 
-  // Applies the given links. For each detection, stores the row of the track that it continues.
+  // The row of the track whose last detection is i, kNone if there is none.
+  std::int32_t row_ending_at(const Partition<Filter>& p, std::int32_t i) const {
+    const std::int32_t k = p.track_of(i);
+    const bool is_listed =
+        k >= 0 && p.last(k) == i && p.window().now() - p.window()[i].frame <= p.window().max_gap();
+    return is_listed ? s_.row_of[k] : kNone;
+  }
+
+  // Applies the given links. For each detection, stores the row of the track that it continues. The
+  // first detections of a track, or those after a jolt, may be less probable in the track than as
+  // clutter until more of them follow. So the given detections that are free are added with the next
+  // one of their track.
   void give_links(const Partition<Filter>& p, ChainStats& stats) {
     const DetectionWindow& window = p.window();
     const auto& ids = window.frame(window.now()).ids;
     s_.row_given.assign(ids.size(), kNone);
+    s_.is_continued.assign(s_.rows.size(), false);
     s_.n_edits = 0;
     s_.added.clear();
     if (!given_) return;
@@ -119,22 +131,39 @@ class FrameStart {
       const std::int32_t j = ids[c];
       const std::int64_t label = given_->of(window[j].number);
       if (label < 0) continue;
-      const auto [at, is_new] = last_.try_emplace(label);
-      const std::int32_t i = at->second.detection;
+      const auto [at, is_new] = before_.try_emplace(label);
       if (!is_new) ++stats.n_given;
-      // The number may have been reused for another detection.
-      const bool is_here = !is_new && window[i].number == at->second.number && window.is_linkable(i, j);
-      if (is_here && p.track_of(i) >= 0 && p.last(p.track_of(i)) == i) {
-        s_.row_given[c] = s_.row_of[p.track_of(i)];
+      std::vector<Given>& before = at->second;
+      std::erase_if(before, [&](const Given& each) {  // the number was reused for another detection
+        return window[each.detection].number != each.number;
+      });
+      const std::int32_t i = before.empty() ? -1 : before.back().detection;
+      const bool is_here = i >= 0 && window.is_linkable(i, j);
+      if (const std::int32_t row = is_here ? row_ending_at(p, i) : kNone; row >= 0) {
+        s_.row_given[c] = row;
       } else if (is_here && p.is_free(i)) {
-        s_.row_given[c] = kNewTrack;
+        std::size_t first = before.size() - 1;
+        const auto is_linkable = [&](std::size_t n) {
+          return window.is_linkable(before[n - 1].detection, before[n].detection);
+        };
+        while (first > 0 && is_linkable(first) && p.is_free(before[first - 1].detection)) --first;
         Edit<Filter>& edit = next_edit();
-        append(p, edit, i);
+        s_.row_given[c] = kNewTrack;
+        if (const std::int32_t row = first > 0 && is_linkable(first)
+                                         ? row_ending_at(p, before[first - 1].detection)
+                                         : kNone;
+            row >= 0) {
+          s_.row_given[c] = row;
+          s_.is_continued[row] = true;
+          edit.track = s_.rows[row];
+          edit.keep = p.track(edit.track).size();
+        }
+        for (; first < before.size(); ++first) append(p, edit, before[first].detection);
         append(p, edit, j);
       } else if (!is_new) {
         ++stats.n_refused;
       }
-      at->second = {j, window[j].number};
+      before.push_back({j, window[j].number});
     }
   }
 
@@ -256,7 +285,7 @@ class FrameStart {
     std::vector<std::int32_t> rows, row_given, match, missed;
     std::vector<std::int32_t> added;  // detections of the last edits
     std::vector<std::int32_t> row_of;  // by track, only for those listed in `rows`
-    std::vector<char> is_given;
+    std::vector<char> is_given, is_continued;  // by row
     std::vector<Candidate> candidates, others;
     std::vector<Found> found;  // by block
     std::vector<Edit<Filter>> edits;  // the first `n_edits` are those of this frame
@@ -270,7 +299,8 @@ class FrameStart {
   double within_;  // ambiguous_within
   std::int32_t n_threads_;
   std::shared_ptr<const GivenLabels> given_;
-  std::unordered_map<std::int64_t, Last> last_;  // last detection of each given label
+  // The detections of each given label in the window.
+  std::unordered_map<std::int64_t, std::vector<Given>> before_;
   Scratch<Memory> s_;
 };
 
