@@ -139,32 +139,38 @@ class FrameStart {
       });
       const std::int32_t i = before.empty() ? -1 : before.back().detection;
       const bool is_here = i >= 0 && window.is_linkable(i, j);
-      if (const std::int32_t row = is_here ? row_ending_at(p, i) : kNone; row >= 0) {
+      const std::int32_t row = is_here ? row_ending_at(p, i) : kNone;
+      if (row >= 0) {
         s_.row_given[c] = row;
       } else if (is_here && p.is_free(i)) {
-        std::size_t first = before.size() - 1;
-        const auto is_linkable = [&](std::size_t n) {
-          return window.is_linkable(before[n - 1].detection, before[n].detection);
-        };
-        while (first > 0 && is_linkable(first) && p.is_free(before[first - 1].detection)) --first;
-        Edit<Filter>& edit = next_edit();
-        s_.row_given[c] = kNewTrack;
-        if (const std::int32_t row = first > 0 && is_linkable(first)
-                                         ? row_ending_at(p, before[first - 1].detection)
-                                         : kNone;
-            row >= 0) {
-          s_.row_given[c] = row;
-          s_.is_continued[row] = true;
-          edit.track = s_.rows[row];
-          edit.keep = p.track(edit.track).size();
-        }
-        for (; first < before.size(); ++first) append(p, edit, before[first].detection);
-        append(p, edit, j);
+        s_.row_given[c] = add_after_free(p, before, j);
       } else if (!is_new) {
         ++stats.n_refused;
       }
       before.push_back({j, window[j].number});
     }
+  }
+
+  // Adds detection j and the free detections before it with its label to the track that these
+  // continue, or to a new one. Returns the row of the track, or kNewTrack.
+  std::int32_t add_after_free(const Partition<Filter>& p, const std::vector<Given>& before,
+                              std::int32_t j) {
+    const auto is_linked = [&](std::size_t n) {
+      return n > 0 && p.window().is_linkable(before[n - 1].detection, before[n].detection);
+    };
+    std::size_t first = before.size() - 1;
+    while (is_linked(first) && p.is_free(before[first - 1].detection)) --first;
+    const std::int32_t row =
+        is_linked(first) ? row_ending_at(p, before[first - 1].detection) : kNone;
+    Edit<Filter>& edit = next_edit();
+    if (row >= 0) {
+      s_.is_continued[row] = true;
+      edit.track = s_.rows[row];
+      edit.keep = p.track(edit.track).size();
+    }
+    for (; first < before.size(); ++first) append(p, edit, before[first].detection);
+    append(p, edit, j);
+    return row >= 0 ? row : kNewTrack;
   }
 
   // Lists candidates with a positive gain, and other plausible or given links.
