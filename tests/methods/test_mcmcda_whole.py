@@ -62,6 +62,28 @@ def test_fragments_are_repaired(window):
     assert am.evaluate(kept, am.metrics.oracle_tracks(truth, model.population.max_gap)).idf1 > 0.99
 
 
+def test_initial_tracks_with_long_gaps_go_on_as_other_tracks():
+    """The engine reuses the numbers of detections that have left its window."""
+    rng = np.random.default_rng(4)
+    at = rng.uniform(0, 0.3, (12, 3)) + rng.normal(0, 3e-4, (300, 12, 3))
+    is_seen = np.ones((300, 12), dtype=bool)
+    for start, n, k in zip(
+        rng.integers(10, 260, 60), rng.integers(5, 40, 60), np.arange(60) % 12, strict=True
+    ):
+        is_seen[start : start + n, k] = False
+    at[~is_seen] = np.nan
+    truth = am.Tracks.from_dense(np.arange(300) / 100, at)
+    model = am.estimate_model(truth.detections).model
+    model = dataclasses.replace(
+        model, population=dataclasses.replace(model.population, max_speed=60.0, max_gap=4)
+    )
+    few = am.MCMCDA(moves=0, confidence=0)
+    tracks = am.track(truth.detections, few, model=model, start=truth, stitch=False)
+    parts = am.metrics.oracle_tracks(truth, 4)
+    assert tracks.n_tracks == parts.n_tracks > 40
+    assert am.evaluate(tracks, parts).idf1 == 1
+
+
 @pytest.mark.parametrize("seed", [2, 3, 7])
 @pytest.mark.parametrize(("activity", "missing"), [("walk", 0.1), ("run", 0.2)])
 def test_initial_tracks_keep_what_is_improbable_until_more_detections_follow(
