@@ -54,6 +54,22 @@ class Chain {
     visit([&](auto& s) { assign_to(s, labels.data()); });
   }
 
+  // Makes the tracks those of markers that accelerate together: each is of the marker whose label its
+  // first detection has.
+  void give(const In<std::int64_t>& labels, const SharedAcceleration& shared) {
+    require(static_cast<std::int64_t>(labels.size()) == n_seen_, "labels: one for each detection");
+    for (const std::int64_t label : flat(labels))
+      require(label < static_cast<std::int64_t>(shared.size()), "labels: markers");
+    visit([&](auto& s) {
+      auto& p = s.partition();
+      p.give(std::make_shared<const GivenLabels>(GivenLabels{
+          0, {labels.data(), labels.data() + labels.size()}, std::make_shared<const SharedAcceleration>(shared)}));
+      std::vector<std::int32_t> tracks;
+      for (const std::int32_t k : p.tracks().items()) tracks.push_back(k);
+      s.begin_part(p, tracks);
+    });
+  }
+
   Out<std::int64_t> labels() const {
     return visit([&](const auto& s) { return array_of<std::int64_t>(labels_of(s.partition())); });
   }
@@ -157,6 +173,7 @@ void bind_chain(nb::module_& module) {
       .def("add_frame", &Chain::add_frame, "time"_a, "F"_a, "Q"_a, "points"_a)
       .def("freeze", &Chain::freeze, "frame"_a)
       .def("assign", &Chain::assign, "labels"_a)
+      .def("give", &Chain::give, "labels"_a, "shared"_a)
       .def("labels", &Chain::labels)
       .def("log_posterior", &Chain::log_posterior)
       .def("run", &Chain::run, "n_moves"_a)

@@ -50,10 +50,14 @@ void bind_mcmc_tracker(nb::module_& module, const char* name) {
           },
           "model"_a, "score"_a, "chain"_a, "options"_a, "seed"_a)
       .def("start_from",
-           [](Tracker& self, const In<std::int64_t>& labels) {
-             self.start_from({labels.data(), labels.data() + labels.size()});
+           [](Tracker& self, const In<std::int64_t>& labels, const SharedAcceleration* shared) {
+             for (const std::int64_t label : flat(labels))
+               require(shared == nullptr || label < static_cast<std::int64_t>(shared->size()),
+                       "shared: as many markers as labels");
+             self.start_from({labels.data(), labels.data() + labels.size()},
+                             shared == nullptr ? nullptr : std::make_shared<const SharedAcceleration>(*shared));
            },
-           "labels"_a)
+           "labels"_a, "shared"_a.none() = nb::none())
       .def("finish", &finish<Tracker>, "labels"_a.noconvert(), "confidence"_a.noconvert(),
            "goes_on"_a);
 }

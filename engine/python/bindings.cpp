@@ -17,6 +17,7 @@ NB_MODULE(_engine, module) {
   bind_solvers(module);
   bind_chain(module);
   bind_rigid(module);
+  bind_shared(module);
   bind_stitcher(module);
   bind_reconstruct(module);
   bind_naming(module);

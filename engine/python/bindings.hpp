@@ -13,6 +13,7 @@ void bind_camera(nanobind::module_& module);
 void bind_solvers(nanobind::module_& module);
 void bind_chain(nanobind::module_& module);
 void bind_rigid(nanobind::module_& module);
+void bind_shared(nanobind::module_& module);
 void bind_stitcher(nanobind::module_& module);
 void bind_reconstruct(nanobind::module_& module);
 void bind_naming(nanobind::module_& module);

@@ -435,7 +435,7 @@ class _ChainTracker(_Tracker):
         options: McmcOptions,
         seed: int,
     ) -> None: ...
-    def start_from(self, labels: Ints) -> None: ...
+    def start_from(self, labels: Ints, shared: SharedAcceleration | None = None) -> None: ...
     def finish(
         self, labels: Ints, confidence: Floats, goes_on: Callable[[float], bool]
     ) -> None: ...
@@ -450,6 +450,7 @@ class Chain:
     def add_frame(self, time: float, F: Floats, Q: Floats, points: Floats) -> None: ...
     def freeze(self, frame: int) -> None: ...
     def assign(self, labels: Ints) -> None: ...
+    def give(self, labels: Ints, shared: SharedAcceleration) -> None: ...
     def labels(self) -> Ints: ...
     def log_posterior(self) -> float: ...
     def run(self, n_moves: int) -> None: ...
@@ -468,6 +469,34 @@ def judge_distances(
 
 # (R, from, to, rms): b = R (a - from) + to, in three axes.
 def fit_rigid(a: Floats, b: Floats, weights: Floats) -> tuple[Floats, Floats, Floats, float]: ...
+
+# Bonds of marker k: offsets[k] to offsets[k + 1]. Shapes (B, D) and (K, D); log weights (K, 8).
+class SharedAcceleration:
+    def __init__(
+        self,
+        *,
+        offsets: Ints,
+        others: Shorts,
+        distances: Floats,
+        variances: Floats,
+        shape: Floats,
+        own_shape: Floats,
+        log_weights: Floats,
+    ) -> None: ...
+
+# Log densities (N, 8) of the detections of tracks, of which each is of a marker or -1.
+def shared_densities(
+    shared: SharedAcceleration,
+    model: MotionModel,
+    markers: Shorts,
+    points: Floats,
+    frames: Ints,
+    offsets: Ints,
+    times: Floats,
+    kind: Shorts,
+    F: Floats,
+    Q: Floats,
+) -> Floats: ...
 
 # Rotations (F, D, D) of a shape (n, D) that fit its points (F n, D).
 def turns(shape: Floats, points: Floats, weights: Floats) -> Floats: ...

@@ -131,6 +131,7 @@ def instances():
         ),
         am.model.Gap(track=3, first=10, last=20, seconds=1 / 3),
         am.tracking.learn_bonds(truth), am.learn_marker_set(truth),
+        am.tracking.learn_shared_acceleration(truth, plain),
         am.name_tracks(tracks, am.learn_marker_set(truth)),
         am.tracking.Tracked(tracks=tracks, recipe=tracks.recipe),
         settings := am.batch.Settings(method="smp", options={"window": 3}, model=plain, seed=7),

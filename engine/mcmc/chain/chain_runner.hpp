@@ -120,6 +120,7 @@ class ChainRunner {
     Partition<Filter>& p = sampler_.partition();
     p.take_part(whole, group.tracks, group.free);
     sampler_.begin(seed);
+    sampler_.begin_part(whole, group.tracks);
     sampler_.begin_best();
     if (!group.is_listed) return list_hot(group.ambiguous);
     hot_.clear();

@@ -15,6 +15,7 @@
 #include "math/random.hpp"
 #include "mcmc/model/edit_filter.hpp"
 #include "mcmc/model/partition.hpp"
+#include "mcmc/model/shared_term.hpp"
 #include "mcmc/moves/involutive_moves.hpp"
 #include "mcmc/moves/moves.hpp"
 
@@ -62,6 +63,11 @@ class Sampler {
     best_gain_ = last_gain_ = 0;
   }
 
+  // Begins a part of a partition, which was taken of these tracks.
+  void begin_part(const Partition<Filter>& whole, std::span<const std::int32_t> tracks) {
+    shared_.begin(whole, partition_, tracks);
+  }
+
   // Makes one move; returns true if the partition changes. Calls `observe(change, is taken)` for
   // every evaluated proposal, before it is applied.
   template <typename Observe>
@@ -78,12 +84,13 @@ class Sampler {
     const int back = static_cast<int>(inverse(change_.move));
     const double log_u = std::log(random_.uniform());
     // log_reverse is at most 0, so a ratio that is too small without it stays too small.
-    const double threshold = std::min(log_u, weighed_above_);
+    const double threshold = std::min(log_u, weighed_above_) - (shared_.is_on() ? kSharedReach : 0);
     const double log_proposal = (best_gain_ - last_gain_) + then.log[back] - now.log[kind];
     change_.min_gain = threshold - log_proposal + change_.log_forward;
     if (!moves_.weigh(change_)) return false;
     change_.log_ratio = change_.gain + log_proposal - change_.log_forward;
     if (!(change_.log_ratio > threshold)) return false;
+    if (shared_.is_on()) add_shared();
     const bool is_weighed = change_.log_ratio > weighed_above_;
     change_.log_reverse = moves_.log_reverse(change_);
     change_.log_ratio += change_.log_reverse;
@@ -110,13 +117,15 @@ class Sampler {
   template <typename Observe>
   bool step(Listed& move, Observe&& observe) {
     if (!toggles_.propose(move.toggle, change_)) return false;
-    if (!move.is_known(partition_)) {
+    if (!move.is_known(partition_) || shared_.is_on()) {
       weigh_completely();
       move.gain = change_.gain;
       move.weighed = partition_.clock();
     }
     change_.gain = change_.log_ratio = move.gain;
-    return take(std::log(random_.uniform()), true, observe);
+    const double log_u = std::log(random_.uniform());
+    if (shared_.is_on() && move.gain > std::min(log_u, 0.0) - kSharedReach) add_shared();
+    return take(log_u, true, observe);
   }
   // Estimates the gain of a move. Returns false if it is impossible or not above `min_gain`.
   bool estimate(const Toggle& toggle, double min_gain, double& gain) {
@@ -158,6 +167,7 @@ class Sampler {
       for (std::size_t n = edit.keep; n < nodes.size(); ++n) append(partition_, edit, nodes[n]);
     }
     for (const auto& [first, k] : now) edits_.emplace_back().track = static_cast<std::int32_t>(k);
+    if (shared_.is_on()) shared_.apply(edits_);
     partition_.apply(edits_);
     is_best_ = true;
     gain_ = max_gain_;
@@ -187,6 +197,7 @@ class Sampler {
       is_best_ = false;
     }
     if (!change_.is_filtered()) weigh_completely();
+    if (shared_.is_on()) shared_.apply(change_.all());
     partition_.apply(change_.all());
     gain_ += change_.gain;
     is_best_ = is_best_ || gain_ > max_gain_ + kBetter;
@@ -194,6 +205,12 @@ class Sampler {
     return true;
   }
 
+  // Adds the change of the shared term to that of the own scores.
+  void add_shared() {
+    const double gain = shared_.gain(change_.all());
+    change_.gain += gain;
+    change_.log_ratio += gain;
+  }
   void weigh_completely() {
     change_.min_gain = -std::numeric_limits<double>::infinity();
     toggles_.weigh(change_);
@@ -249,6 +266,7 @@ class Sampler {
   Moves<Filter> moves_{partition_, opt_.growth};
   Toggles<Filter> toggles_{partition_};
   Change<Filter> change_;
+  SharedTerm<Filter> shared_;
   std::array<Shares, 3> shares_{};
   std::array<MoveCounts, kMoves> counts_{};
   // Ascent: log posterior of the best partition and of the last accepted one, relative to the
@@ -259,6 +277,8 @@ class Sampler {
   // Since `begin_best`: the gain, its maximum, and whether the present partition attains it. If it
   // does not, the tracks of the best partition are saved.
   static constexpr double kBetter = 1e-9;
+  // Nats by which a shared term may outweigh the own scores. Changes beyond are rejected at once.
+  static constexpr double kSharedReach = 30;
   double gain_ = 0, max_gain_ = 0;
   bool is_best_ = false;
   std::vector<std::int32_t> saved_, first_saved_;

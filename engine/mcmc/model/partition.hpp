@@ -22,6 +22,7 @@
 #include "mcmc/model/continuations.hpp"
 #include "mcmc/model/detection_window.hpp"
 #include "mcmc/model/edits.hpp"
+#include "mcmc/model/given_labels.hpp"
 #include "mcmc/model/link_gains.hpp"
 #include "mcmc/model/path_filter.hpp"
 
@@ -38,6 +39,19 @@ class Partition {
 
   // An empty partition with the same model.
   Partition empty() const { return Partition(m_, sm_, log_end_); }
+
+  // Sets labels of the detections to come, by which tracks are of markers.
+  void give(std::shared_ptr<const GivenLabels> given) { given_ = std::move(given); }
+  const GivenLabels* given() const { return given_.get(); }
+  std::int64_t given_label(std::int32_t i) const { return given_->of(window_[i].number); }
+  // The marker of a track, which is the label given to its first detection; -1 for none.
+  std::int32_t marker(std::int32_t k) const {
+    const Track& t = track(k);
+    return t.n_gone + t.n_frozen > 0 ? t.marker : marker_begun_by(first(k));
+  }
+  std::int32_t marker_begun_by(std::int32_t i) const {
+    return given_ && given_->shared ? static_cast<std::int32_t>(given_label(i)) : -1;
+  }
 
   const DetectionWindow& window() const { return window_; }
   Filter& filter() const { return filter_; }  // mutable: it only caches values
@@ -163,6 +177,7 @@ class Partition {
         const std::int32_t k = track_of_[i];
         if (k == kFree) track_of_[i] = kClutter;
         if (k < 0) continue;
+        if (tracks_[k].n_gone + tracks_[k].n_frozen == 0) tracks_[k].marker = marker_begun_by(i);
         ++tracks_[k].n_frozen;
         young_.remove(k);
       }
@@ -174,6 +189,7 @@ class Partition {
   // contains all open detections and the last settled one.
   void take_part(const Partition& whole, std::span<const std::int32_t> tracks,
                  std::span<const std::int32_t> free) {
+    given_ = whole.given_;
     frozen_ = whole.frozen_;
     n_after_ = whole.n_after_;
     later_.clear();
@@ -192,6 +208,7 @@ class Partition {
       const std::int32_t own = new_track();
       tracks_[own].n_frozen = std::min(t.n_frozen, 1);
       tracks_[own].n_gone = t.n_gone + t.first_open();
+      tracks_[own].marker = t.marker;
       if (t.n_frozen > 0) young_.remove(own);
       for (std::int32_t p = t.first_open(); p < t.size(); ++p, ++i)
         adopt(own, i, whole.state_[t.nodes[p]], whole.score_[t.nodes[p]]);
@@ -356,6 +373,7 @@ class Partition {
     tracks_[k].nodes.clear();
     tracks_[k].n_frozen = tracks_[k].n_gone = 0;
     tracks_[k].id = -1;
+    tracks_[k].marker = -1;
     tracks_[k].stamp = ++clock_;
     all_.add(k);
     young_.add(k);
@@ -371,6 +389,7 @@ class Partition {
   ScoreModel sm_;
   DetectionWindow window_;
   std::shared_ptr<const std::vector<double>> log_end_;
+  std::shared_ptr<const GivenLabels> given_;
   std::int64_t frozen_ = -1;
   std::int64_t n_after_ = 0;  // frames of the capture after the window
   Continuations<Filter> later_;

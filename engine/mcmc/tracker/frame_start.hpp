@@ -23,17 +23,6 @@
 
 namespace asterism {
 
-// Labels of detections by number of arrival, from `first` on, -1 for none.
-struct GivenLabels {
-  std::int64_t first = 0;
-  std::vector<std::int64_t> labels;
-
-  std::int64_t of(std::int64_t number) const {
-    const std::int64_t at = number - first;
-    return at >= 0 && at < static_cast<std::int64_t>(labels.size()) ? labels[at] : -1;
-  }
-};
-
 template <typename Filter>
 class FrameStart {
  public:
@@ -41,10 +30,8 @@ class FrameStart {
   FrameStart(bool has_assignment, double ambiguous_within, std::int32_t n_threads)
       : has_assignment_(has_assignment), within_(ambiguous_within), n_threads_(n_threads) {}
 
-  void give(GivenLabels labels) {
-    given_ = std::make_shared<const GivenLabels>(std::move(labels));
-    before_.clear();
-  }
+  // Forgets the labels given to the frames so far, as others are given to those to come.
+  void forget_given() { before_.clear(); }
 
   // Adds the detections of the newest frame to the tracks of the partition, and its ambiguous
   // links.
@@ -126,10 +113,10 @@ class FrameStart {
     s_.is_continued.assign(s_.rows.size(), false);
     s_.n_edits = 0;
     s_.added.clear();
-    if (!given_) return;
+    if (p.given() == nullptr) return;
     for (std::size_t c = 0; c < ids.size(); ++c) {
       const std::int32_t j = ids[c];
-      const std::int64_t label = given_->of(window[j].number);
+      const std::int64_t label = p.given_label(j);
       if (label < 0) continue;
       const auto [at, is_new] = before_.try_emplace(label);
       if (!is_new) ++stats.n_given;
@@ -304,7 +291,6 @@ class FrameStart {
   bool has_assignment_;
   double within_;  // ambiguous_within
   std::int32_t n_threads_;
-  std::shared_ptr<const GivenLabels> given_;
   // The detections of each given label in the window.
   std::unordered_map<std::int64_t, std::vector<Given>> before_;
   Scratch<Memory> s_;

@@ -123,7 +123,12 @@ class McmcTracker {
   }
 
   // Sets labels whose links the coming frames start from, if the model allows them.
-  void start_from(std::vector<std::int64_t> labels) { start_.give({so_far_.n_seen, std::move(labels)}); }
+  // With `shared`, the labels are also those of its markers.
+  void start_from(std::vector<std::int64_t> labels, std::shared_ptr<const SharedAcceleration> shared) {
+    partition_.give(std::make_shared<const GivenLabels>(
+        GivenLabels{so_far_.n_seen, std::move(labels), std::move(shared)}));
+    start_.forget_given();
+  }
 
   bool has_confidence() const { return opt_.confidence > 0; }
   const Progress& so_far() const { return so_far_; }

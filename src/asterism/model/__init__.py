@@ -13,6 +13,7 @@ from asterism.model.population import Population
 from asterism.model.posterior import log_posterior, track_scores
 from asterism.model.recipe import Recipe
 from asterism.model.sensor import Sensor
+from asterism.model.shared_acceleration import SharedAcceleration, shared_gains
 from asterism.model.side_data import Analog, Event, ForcePlate
 from asterism.model.tracking_model import TrackingModel
 from asterism.model.tracks import Tracks
@@ -37,9 +38,11 @@ __all__ = [
     "RandomWalk",
     "Recipe",
     "Sensor",
+    "SharedAcceleration",
     "SingleMotion",
     "TrackingModel",
     "Tracks",
     "log_posterior",
+    "shared_gains",
     "track_scores",
 ]

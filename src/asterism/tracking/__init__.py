@@ -32,7 +32,7 @@ from asterism.tracking.naming import (
 )
 from asterism.tracking.pipeline import Tracked, carry_out, track
 from asterism.tracking.plan import Plan, plan_tracking
-from asterism.tracking.rigidity import Bonds, learn_bonds
+from asterism.tracking.rigidity import Bonds, learn_bonds, learn_shared_acceleration
 from asterism.tracking.stitching import (
     Join,
     Stitched,
@@ -83,6 +83,7 @@ __all__ = [
     "fill_gaps",
     "learn_bonds",
     "learn_marker_set",
+    "learn_shared_acceleration",
     "merge_marker_sets",
     "method_by_name",
     "name_tracks",

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from asterism.metrics import oracle_tracks
 from asterism.tracking.confidence.identity import OTHER_JOIN
 from asterism.tracking.confidence.reassign import ghost_log_odds, reassigned
 from asterism.tracking.lone import with_lone_detections
 from asterism.tracking.lost import with_lost_markers
 from asterism.tracking.naming import learn_marker_set, name_tracks
+from asterism.tracking.stitching import stitch
 from asterism.tracking.stitching.exchanged import exchanged_back, with_markers
 
 if TYPE_CHECKING:
@@ -66,8 +68,8 @@ def assigned_again(found: Uncorrected) -> Uncorrected:
 
     Then tracks take lone detections and those of lost markers, and tracks that have each other's
     marker are exchanged back (`exchanged_by_spreads`). Where the method has bonds, all of that is
-    repeated while it makes more identities certain. Where bonds do not make the identities of a
-    capture more certain, its distances vary too much.
+    repeated with the tracks stitched again, while it makes more identities certain. Where bonds do
+    not make the identities of a capture more certain, its distances vary too much.
 
     Parameters
     ----------
@@ -76,7 +78,8 @@ def assigned_again(found: Uncorrected) -> Uncorrected:
     """
     best = found
     for n in range(MAX_ROUNDS):
-        again = _with_lost_markers(_with_lone_detections(_reassigned(best)))
+        begun = best if n == 0 else _stitched_again(best)
+        again = _with_lost_markers(_with_lone_detections(_reassigned(begun)))
         again = exchanged_by_spreads(again)
         if n > 0 and again.expected_right <= best.expected_right:
             break
@@ -84,6 +87,26 @@ def assigned_again(found: Uncorrected) -> Uncorrected:
         if not best.is_doubtful or not best.has_bonds:
             break
     return best
+
+
+def _stitched_again(found: Uncorrected) -> Uncorrected:
+    """Stitch the pieces of tracks between gaps that the model excludes, and keep the labels.
+
+    A method with bonds follows a marker through longer gaps, where it may have lost it. As joins
+    of pieces they are uncertain.
+
+    Parameters
+    ----------
+    found : Uncorrected
+        Tracks without names.
+    """
+    tracks, model = found.tracks, found.model
+    if found.stitching is None:
+        return found
+    pieces = oracle_tracks(tracks, model.population.max_gap)
+    pieces = dataclasses.replace(pieces, info=tracks.info, recipe=tracks.recipe)
+    again = dataclasses.replace(found, tracks=tracks, stitching=stitch(pieces, model))
+    return _with_labels(again, tracks.labels, int(tracks.info.get("refinements", 0)))
 
 
 def _reassigned(found: Uncorrected) -> Uncorrected:

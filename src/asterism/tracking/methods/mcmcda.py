@@ -10,6 +10,7 @@ import numpy as np
 
 from asterism.checks import check_array, check_fields, check_kind, check_number
 from asterism.errors import ParameterError
+from asterism.model.shared_acceleration import SharedAcceleration
 from asterism.records import record
 from asterism.tracking.methods.chain_options import ChainOptions
 from asterism.tracking.methods.engine_method import EngineMethod, EngineState
@@ -220,6 +221,7 @@ class MCMCDA(EngineMethod):
         n_axes: int = 3,
         seed: int | None = None,
         start: ArrayLike | None = None,
+        shared: SharedAcceleration | None = None,
     ) -> EngineState:
         """Return the state before the first frame; see `Method.init`.
 
@@ -229,6 +231,11 @@ class MCMCDA(EngineMethod):
             As for `Method.init`.
         start : array_like of int, shape (N,), optional
             Initial labels of the detections to come, -1 for none, from which the chain starts.
+        shared : SharedAcceleration, optional
+            How the markers of the labels accelerate together. A track is of the marker whose label
+            its first detection has, and the chain samples the posterior with `shared_gains`. Tracks
+            of another group of the same frame are fixed meanwhile. A move whose own scores are more
+            than 30 nats too small is rejected unseen.
 
         Returns
         -------
@@ -237,7 +244,8 @@ class MCMCDA(EngineMethod):
         Raises
         ------
         ParameterError
-            If no track can start, neither by a move nor from a label.
+            If no track can start, neither by a move nor from a label, or `shared` is of other
+            labels, or of a whole capture with ``window=None``.
 
         Examples
         --------
@@ -256,8 +264,23 @@ class MCMCDA(EngineMethod):
         state = super().init(model, n_axes=n_axes, seed=seed)
         if start is not None:
             labels = check_array("start", start, ("N",), dtype=np.int64)
-            _own(state).start_from(labels)
+            _own(state).start_from(labels, self._compiled(shared, labels))
         return state
+
+    def _compiled(
+        self, shared: SharedAcceleration | None, labels: NDArray[np.int64]
+    ) -> _engine.SharedAcceleration | None:
+        if shared is None:
+            return None
+        check_kind("shared", shared, SharedAcceleration, "am.tracking.learn_shared_acceleration(…)")
+        if self.window is None:
+            raise ParameterError("window", "a number of frames with shared accelerations", "None")
+        K = len(shared.weights)
+        if labels.max(initial=-1) >= K:
+            raise ParameterError(
+                "shared", f"one marker for each label, up to {labels.max()}", f"{K}"
+            )
+        return shared.compiled
 
     def _check(self, state: EngineState, time: float, points: ArrayLike) -> None:
         del state, time, points

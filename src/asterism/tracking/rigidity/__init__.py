@@ -1,5 +1,6 @@
 """Bonds: stable distances between markers, used by stitching, naming and filling."""
 
 from asterism.tracking.rigidity.bonds import Bonds, learn_bonds
+from asterism.tracking.rigidity.shared import learn_shared_acceleration
 
-__all__ = ["Bonds", "learn_bonds"]
+__all__ = ["Bonds", "learn_bonds", "learn_shared_acceleration"]

@@ -1,0 +1,269 @@
+// The part of the log posterior by which markers of a segment accelerate together
+// (rigid/shared_acceleration.hpp), in a part of a partition.
+//
+// Each track is of the marker whose label its first detection was given. The term of a detection
+// depends on the detections of neighbours in its frame, in that of the detection before it, and in
+// the frame before that. A change of tracks changes the terms of
+//
+//   own detections from the first change on, because it changes their filter
+//   other markers that have one of theirs as a neighbour in one of these frames
+//
+// Tracks of the whole partition that are not in the part are fixed: the term is conditional on them.
+// A marker with detections of two tracks in a frame has no place there.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <span>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "mcmc/model/edit_filter.hpp"
+#include "mcmc/model/edits.hpp"
+#include "mcmc/model/partition.hpp"
+#include "rigid/shared_acceleration.hpp"
+
+namespace asterism {
+
+template <typename Filter>
+class SharedTerm {
+ public:
+  // Begins a part, which was taken of these tracks. Without labels the term is 0.
+  void begin(const Partition<Filter>& whole, const Partition<Filter>& part,
+             std::span<const std::int32_t> tracks) {
+    whole_ = &whole;
+    part_ = &part;
+    is_on_ = false;
+    if (whole.given() == nullptr || whole.given()->shared == nullptr) return;
+    shared_ = whole.given()->shared.get();
+    first_ = whole.window().first();
+    n_frames_ = whole.window().now() - first_ + 1;
+    const std::size_t n_slots = shared_->size() * static_cast<std::size_t>(n_frames_);
+    slots_.resize(std::max(slots_.size(), n_slots));
+    for (std::size_t s = 0; s < n_slots; ++s) slots_[s].clear();
+    outside_.resize(std::max(outside_.size(), shared_->size()));
+    for (std::vector<std::int32_t>& of : outside_) of.clear();
+    is_inside_.assign(is_inside_.size(), 0);
+    for (const std::int32_t k : tracks) {
+      if (static_cast<std::size_t>(k) >= is_inside_.size()) is_inside_.resize(k + 1, 0);
+      is_inside_[k] = 1;
+      const std::int32_t marker = whole.marker(k);
+      is_on_ = is_on_ || (marker >= 0 && shared_->has_neighbours(marker));
+    }
+    if (!is_on_) return;
+    known_inside_.assign(part.window().n_ids(), kUnknown);
+    known_outside_.assign(whole.window().n_ids(), kUnknown);
+    for (const std::int32_t k : whole.tracks().items()) {
+      const std::int32_t marker = whole.marker(k);
+      if (marker < 0) continue;
+      for (const std::int32_t i : whole.track(k).nodes)
+        slot(marker, whole.window()[i].frame).push_back(whole.window()[i].y);
+      const auto at = static_cast<std::size_t>(k);
+      if (at >= is_inside_.size() || !is_inside_[at]) outside_[marker].push_back(k);
+    }
+  }
+  bool is_on() const { return is_on_; }
+
+  // The change of the term by edits, which must be filtered.
+  double gain(std::span<const Edit<Filter>> edits) {
+    list_changes(edits);
+    list_dependent(edits);
+    double sum = 0;
+    for (const Edit<Filter>& edit : edits)
+      if (edit.track >= 0) sum -= own_terms(edit);
+    for (const Node& one : dependent_) sum -= known(one);
+    move_places();
+    for (const Edit<Filter>& edit : edits) sum += new_terms(edit);
+    for (const Node& one : dependent_) sum += term(one);
+    move_places(true);
+    return sum;
+  }
+  // Follows edits that are about to be applied to the part.
+  void apply(std::span<const Edit<Filter>> edits) {
+    list_changes(edits);
+    list_dependent(edits);
+    for (const Node& one : dependent_) known_at(one) = kUnknown;
+    for (const Edit<Filter>& edit : edits)
+      for (const std::int32_t i : edit.tail.nodes) known_inside_[i] = kUnknown;
+    move_places();
+  }
+
+ private:
+  static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+  // A detection that a marker gets or loses.
+  struct Changed {
+    std::int32_t marker = 0;
+    std::int64_t frame = 0;
+    std::int32_t detection = 0;
+    bool is_new = false;
+    auto key() const { return std::tuple(marker, frame, detection); }
+  };
+  // A detection of a track, of the part or of the whole partition.
+  struct Node {
+    std::int32_t track = 0, place = 0;
+    bool is_outside = false;
+    auto operator<=>(const Node&) const = default;
+  };
+
+  std::vector<Point>& slot(std::int32_t marker, std::int64_t frame) {
+    return slots_[static_cast<std::size_t>(marker) * static_cast<std::size_t>(n_frames_) +
+                  static_cast<std::size_t>(frame - first_)];
+  }
+  const Point* place(std::int32_t marker, std::int64_t frame) {
+    if (frame < first_) return nullptr;
+    const std::vector<Point>& at = slot(marker, frame);
+    return at.size() == 1 ? &at.front() : nullptr;
+  }
+  static void remove(std::vector<Point>& at, const Point& y) {
+    const auto found = std::ranges::find(at, y);
+    *found = at.back();
+    at.pop_back();
+  }
+  // The marker of an edited track after the edit.
+  std::int32_t new_marker(const Edit<Filter>& edit) const {
+    if (edit.keep > 0) return part_->marker(edit.track);
+    return edit.tail.nodes.empty() ? -1 : part_->marker_begun_by(edit.tail.nodes.front());
+  }
+
+  void list_changes(std::span<const Edit<Filter>> edits) {
+    all_.clear();
+    changed_.clear();
+    const DetectionWindow& window = part_->window();
+    for (const Edit<Filter>& edit : edits) {
+      if (edit.track >= 0)
+        if (const std::int32_t marker = part_->marker(edit.track); marker >= 0) {
+          const auto& nodes = part_->track(edit.track).nodes;
+          for (std::size_t n = edit.keep; n < nodes.size(); ++n)
+            all_.push_back({marker, window[nodes[n]].frame, nodes[n], false});
+        }
+      if (const std::int32_t marker = new_marker(edit); marker >= 0)
+        for (const std::int32_t i : edit.tail.nodes)
+          all_.push_back({marker, window[i].frame, i, true});
+    }
+    std::ranges::sort(all_, {}, &Changed::key);
+    for (std::size_t n = 0; n < all_.size(); ++n)
+      if (n + 1 < all_.size() && all_[n].key() == all_[n + 1].key())
+        ++n;  // lost and got again
+      else
+        changed_.push_back(all_[n]);
+  }
+  // Moves the places of markers to those after the listed changes, and back.
+  void move_places(bool is_back = false) {
+    for (const Changed& one : changed_) {
+      std::vector<Point>& at = slot(one.marker, one.frame);
+      const Point& y = part_->window()[one.detection].y;
+      if (one.is_new != is_back)
+        at.push_back(y);
+      else
+        remove(at, y);
+    }
+  }
+
+  // Lists the detections that are not edited and have a changed one as a neighbour.
+  void list_dependent(std::span<const Edit<Filter>> edits) {
+    dependent_.clear();
+    for (const Changed& one : changed_)
+      for (const std::int32_t marker : (*shared_)[one.marker].after) {
+        for (const std::int32_t k : outside_[marker])
+          list_dependent(*whole_, k, whole_->track(k).size(), one.frame, true);
+        for (const std::int32_t k : part_->tracks().items()) {
+          if (part_->marker(k) != marker) continue;
+          std::int32_t n = part_->track(k).size();
+          for (const Edit<Filter>& edit : edits)
+            if (edit.track == k) n = edit.keep;
+          list_dependent(*part_, k, n, one.frame, false);
+        }
+      }
+    std::ranges::sort(dependent_);
+    const auto rest = std::ranges::unique(dependent_);
+    dependent_.erase(rest.begin(), rest.end());
+  }
+  // Those of the first n detections of a track that have one of this frame as a neighbour.
+  void list_dependent(const Partition<Filter>& p, std::int32_t k, std::int32_t n,
+                      std::int64_t frame, bool is_outside) {
+    const auto& nodes = p.track(k).nodes;
+    for (std::int32_t at = n - 1; at > 0; --at) {
+      const std::int64_t to = p.window()[nodes[at]].frame;
+      if (to < frame) return;
+      if (to <= frame + 2 || p.window()[nodes[at - 1]].frame == frame)
+        dependent_.push_back({k, at, is_outside});
+    }
+  }
+
+  double& known_at(const Node& one) {
+    return one.is_outside ? known_outside_[whole_->track(one.track).nodes[one.place]]
+                          : known_inside_[part_->track(one.track).nodes[one.place]];
+  }
+  // The term of a detection in the present state of the part.
+  double known(const Node& one) {
+    double& value = known_at(one);
+    if (std::isnan(value)) value = term(one);
+    return value;
+  }
+  double term(const Node& one) {
+    const Partition<Filter>& p = one.is_outside ? *whole_ : *part_;
+    const auto& nodes = p.track(one.track).nodes;
+    const std::int32_t i = nodes[one.place - 1];
+    return term(p, p.marker(one.track), p.state(i), i, nodes[one.place],
+                p.track(one.track).n_gone + one.place);
+  }
+  double own_terms(const Edit<Filter>& edit) {
+    const auto& nodes = part_->track(edit.track).nodes;
+    double sum = 0;
+    if (part_->marker(edit.track) < 0) return sum;
+    for (std::int32_t n = std::max(edit.keep, 1); n < static_cast<std::int32_t>(nodes.size()); ++n)
+      sum += known({edit.track, n, false});
+    return sum;
+  }
+  double new_terms(const Edit<Filter>& edit) {
+    const std::int32_t marker = new_marker(edit);
+    if (marker < 0) return 0;
+    const Tail<Filter>& tail = edit.tail;
+    const std::int32_t n_kept = edit.track < 0 ? 0 : part_->track(edit.track).n_gone + edit.keep;
+    double sum = 0;
+    for (std::size_t n = edit.keep == 0; n < tail.nodes.size(); ++n) {
+      const std::int32_t i = before(*part_, edit, n);
+      sum += term(*part_, marker, n == 0 ? part_->state(i) : tail.states[n - 1], i, tail.nodes[n],
+                  n_kept + static_cast<std::int32_t>(n));
+    }
+    return sum;
+  }
+  // The term of detection j after detection i, which follows `n_before` - 1 others of its track and
+  // has this filter state.
+  double term(const Partition<Filter>& p, std::int32_t marker, const typename Filter::State& state,
+              std::int32_t i, std::int32_t j, std::int32_t n_before) {
+    if ((*shared_)[marker].before.empty()) return 0;
+    const DetectionWindow& window = p.window();
+    const auto &from = window[i], &to = window[j];
+    const auto gap = static_cast<int>(to.frame - from.frame);
+    p.filter().expect(p.motion(), window, state, from.frame, gap, expected_);
+    shared_->densities(
+        Filter::own_motion(p.motion(), expected_),
+        {marker, from.frame, to.frame, from.y, to.y, n_before > 1},
+        [&](std::int32_t other, std::int64_t frame) { return place(other, frame); }, memory_,
+        densities_);
+    return shared_->gain(marker, densities_);
+  }
+
+  const Partition<Filter>*whole_ = nullptr, *part_ = nullptr;
+  const SharedAcceleration* shared_ = nullptr;
+  bool is_on_ = false;
+  std::int64_t first_ = 0, n_frames_ = 0;
+  std::vector<std::vector<Point>> slots_;           // detections by marker and frame
+  std::vector<std::vector<std::int32_t>> outside_;  // tracks of the whole partition by marker
+  std::vector<char> is_inside_;
+  std::vector<Changed> all_, changed_;
+  std::vector<Node> dependent_;
+  // Terms in the present state, by detection of the part and of the whole partition.
+  std::vector<double> known_inside_, known_outside_;
+  typename Filter::Expected expected_{};
+  SharedAcceleration::Densities densities_{};
+  SharedAcceleration::Memory memory_;
+};
+
+}  // namespace asterism

@@ -1,0 +1,138 @@
+// Bindings of the density of markers that accelerate together.
+#include <algorithm>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "filter/track_filter.hpp"
+#include "python/arrays.hpp"
+#include "python/bindings.hpp"
+#include "python/motion_arrays.hpp"
+#include "rigid/shared_acceleration.hpp"
+
+using namespace nb::literals;
+using namespace asterism;
+
+namespace {
+
+constexpr std::size_t kShared = SharedAcceleration::kComponents;
+
+Point point_of(const In<double>& array, std::size_t row) {
+  Point out{};
+  std::copy_n(array.data() + row * array.shape(1), array.shape(1), out.begin());
+  return out;
+}
+
+// The bonds of marker k are those from offsets[k] to offsets[k + 1], by increasing variance.
+void make_shared_acceleration(SharedAcceleration* self, const In<std::int64_t>& offsets,
+                              const In<std::int32_t>& others, const In<double>& distances,
+                              const In<double>& variances, const In<double>& shape,
+                              const In<double>& own_shape, const In<double>& log_weights) {
+  const std::size_t n = others.size();
+  require(offsets.ndim() == 1, "offsets: shape (K + 1,)");
+  require_offsets(flat(offsets), n, "offsets: rising, within the bonds");
+  require(distances.size() == n && variances.size() == n, "distances and variances: shape (B,)");
+  const std::size_t K = offsets.size() - 1;
+  require(own_shape.ndim() == 2 && own_shape.shape(0) == K &&
+              (own_shape.shape(1) == 2 || own_shape.shape(1) == 3),
+          "own_shape: shape (K, 2 or 3)");
+  require(shape.ndim() == 2 && shape.shape(0) == n && shape.shape(1) == own_shape.shape(1),
+          "shape: shape (B, D)");
+  require(log_weights.ndim() == 2 && log_weights.shape(0) == K && log_weights.shape(1) == kShared,
+          "log_weights: shape (K, components)");
+  std::vector<SharedAcceleration::Marker> markers(K);
+  for (std::size_t k = 0; k < K; ++k) {
+    SharedAcceleration::Marker& marker = markers[k];
+    marker.shape = point_of(own_shape, k);
+    std::copy_n(log_weights.data() + k * kShared, kShared, marker.log_weight.begin());
+    for (auto b = static_cast<std::size_t>(offsets.data()[k]);
+         b < static_cast<std::size_t>(offsets.data()[k + 1]); ++b) {
+      const std::int32_t other = others.data()[b];
+      require(other >= 0 && other < static_cast<std::int64_t>(k), "others: markers before it");
+      marker.before.push_back({other, 1 / variances.data()[b], distances.data()[b], point_of(shape, b)});
+    }
+  }
+  new (self) SharedAcceleration(static_cast<int>(own_shape.shape(1)), std::move(markers));
+}
+
+// The detections of markers in frames. A marker with those of two tracks in a frame has none there.
+class MarkerPlaces {
+ public:
+  MarkerPlaces(const TrackPoints& tracks, std::span<const std::int32_t> markers, std::size_t n_markers,
+               std::int64_t n_frames)
+      : n_frames_(n_frames), places_(n_markers * static_cast<std::size_t>(n_frames)) {
+    for (std::size_t k = 0; k < tracks.n_tracks(); ++k) {
+      if (markers[k] < 0) continue;
+      for (std::int64_t i = tracks.offsets[k]; i < tracks.offsets[k + 1]; ++i) {
+        Place& place = places_[index(markers[k], tracks.frames[i])];
+        place = {&tracks.points[i], place.n + 1};
+      }
+    }
+  }
+  const Point* operator()(std::int32_t marker, std::int64_t frame) const {
+    if (frame < 0) return nullptr;
+    const Place& place = places_[index(marker, frame)];
+    return place.n == 1 ? place.at : nullptr;
+  }
+
+ private:
+  struct Place {
+    const Point* at = nullptr;
+    std::int32_t n = 0;
+  };
+  std::size_t index(std::int32_t marker, std::int64_t frame) const {
+    return static_cast<std::size_t>(marker * n_frames_ + frame);
+  }
+
+  std::int64_t n_frames_;
+  std::vector<Place> places_;
+};
+
+// The log densities (N, components) of the detections of tracks. Each track is of a marker, -1 for
+// none. The first detection of a track has none, and gets NaN, as those of no marker.
+Out<double> shared_densities(const SharedAcceleration& shared, const MotionModel& m,
+                             const In<std::int32_t>& markers, const In<double>& points,
+                             const In<std::int64_t>& frames, const In<std::int64_t>& offsets,
+                             const In<double>& times, const In<std::int32_t>& kind,
+                             const In<double>& F, const In<double>& Q) {
+  const TrackPoints tracks(points, frames, offsets, m.axis.D, times.size());
+  const Timeline line = timeline(m, times, kind, F, Q);
+  require(shared.n_axes() == m.axis.D, "shared: as many axes as the model");
+  require(markers.size() == tracks.n_tracks(), "markers: one for each track");
+  require_within(flat(markers), -1, static_cast<std::int32_t>(shared.size()), "markers: known ones");
+  Owned<double> out(tracks.points.size() * kShared);
+  {
+    nb::gil_scoped_release release;
+    std::fill_n(out.data.get(), tracks.points.size() * kShared, std::numeric_limits<double>::quiet_NaN());
+    const MarkerPlaces places(tracks, flat(markers), shared.size(), static_cast<std::int64_t>(times.size()));
+    SharedAcceleration::Densities each;
+    SharedAcceleration::Memory memory;
+    for (std::size_t k = 0; k < tracks.n_tracks(); ++k) {
+      const auto own = tracks.points_of(k);
+      const auto at = tracks.frames_of(k);
+      const std::int32_t marker = markers.data()[k];
+      if (own.empty() || marker < 0) continue;
+      MotionState state = begin_state(m, own[0]);
+      for (std::size_t i = 1; i < own.size(); ++i) {
+        for (std::int64_t t = at[i - 1] + 1; t <= at[i]; ++t) predict(m, line.step(t), state);
+        const Prediction prediction(m, state);
+        shared.densities(OwnMotion(prediction, m.axis.r),
+                         {marker, at[i - 1], at[i], own[i - 1], own[i], i > 1}, places, memory, each);
+        update(m, prediction, own[i], state);
+        const std::size_t row = static_cast<std::size_t>(tracks.offsets[k]) + i;
+        std::ranges::copy(each, out.data.get() + row * kShared);
+      }
+    }
+  }
+  return out.give({tracks.points.size(), kShared});
+}
+
+}  // namespace
+
+void bind_shared(nb::module_& module) {
+  nb::class_<SharedAcceleration>(module, "SharedAcceleration")
+      .def("__init__", &make_shared_acceleration, nb::kw_only(), "offsets"_a, "others"_a,
+           "distances"_a, "variances"_a, "shape"_a, "own_shape"_a, "log_weights"_a);
+  module.def("shared_densities", &shared_densities, "shared"_a, "model"_a, "markers"_a, "points"_a,
+             "frames"_a, "offsets"_a, "times"_a, "kind"_a, "F"_a, "Q"_a);
+}

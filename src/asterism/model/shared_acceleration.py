@@ -1,0 +1,200 @@
+"""Markers that accelerate together: the density of detections given those of bonded markers.
+
+The markers are ordered. The joint density of a frame is the product of one conditional density
+each, given the past and the markers before it, so that the log posterior of a partition remains one
+number:
+
+    log π(ω) + Σ gain(y),  gain(y) = log Σ_c w_c p_c(y) - log p(y)
+
+p is the density by the marker's own motion, which `track_scores` has, and p_c are the `COMPONENTS`:
+that density, and those in which the position is also predicted by the acceleration or by the rigid
+motion of neighbours (`engine/rigid/shared_acceleration.hpp` has the formulas). The weights w_c are
+learnt for each marker. A marker that moves independently has the weight 1 of its own motion.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism import _engine
+from asterism.checks import check_array, check_kind
+from asterism.errors import ParameterError
+from asterism.model.compiled import motion_model, steps_of, with_noise
+from asterism.model.tracking_model import TrackingModel
+from asterism.model.tracks import Tracks
+from asterism.records import record
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["COMPONENTS", "SharedAcceleration", "shared_gains"]
+
+COMPONENTS = (
+    "own", "field 0.1", "field 0.5", "rigid 0.25", "rigid 1", "shape", "shape, rigid 0.25",
+    "shape, rigid 1",
+)  # fmt: skip
+"""Predictions of a detection, with the factors of their variances."""
+
+
+@record(eq=False)
+class SharedAcceleration:
+    """How K markers accelerate together: their bonds, their shape, and the weights of predictions.
+
+    Parameters
+    ----------
+    offsets : ndarray of int, shape (K + 1,)
+        Bonds of marker k are those from ``offsets[k]`` to ``offsets[k + 1]``, the steadiest first.
+    others : ndarray of int, shape (B,)
+        Other marker of each bond, which comes before marker k.
+    distances : ndarray of shape (B,)
+        Usual distance, metres.
+    variances : ndarray of shape (B,)
+        Predictive variance of the distance, m².
+    shape : ndarray of shape (B, D)
+        Position of the other marker in a frame in which the distances of marker k were usual,
+        metres; NaN if it was not detected there.
+    own_shape : ndarray of shape (K, D)
+        Position of the markers themselves in these frames.
+    weights : ndarray of shape (K, C)
+        Weight of each of the `COMPONENTS`, with the sum 1.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.person(frames=60, seed=1)
+    >>> model = am.estimate_model(truth.detections).model
+    >>> shared = am.tracking.learn_shared_acceleration(truth, model)
+    >>> shared
+    SharedAcceleration(53 markers, 704 bonds, weight of own motion 0.00)
+    """
+
+    offsets: NDArray[np.int64]
+    others: NDArray[np.int32]
+    distances: NDArray[np.float64]
+    variances: NDArray[np.float64]
+    shape: NDArray[np.float64]
+    own_shape: NDArray[np.float64]
+    weights: NDArray[np.float64]
+
+    def __repr__(self) -> str:
+        own = float(self.weights[:, 0].mean()) if len(self.weights) else 1.0
+        return (
+            f"SharedAcceleration({len(self.weights)} markers, {len(self.others)} bonds, weight of "
+            f"own motion {own:.2f})"
+        )
+
+    @cached_property
+    def compiled(self) -> _engine.SharedAcceleration:
+        """The same as an engine object."""
+        with np.errstate(divide="ignore"):
+            log_weights = np.log(self.weights)
+        return _engine.SharedAcceleration(
+            offsets=self.offsets, others=self.others, distances=self.distances,
+            variances=self.variances, shape=self.shape, own_shape=self.own_shape,
+            log_weights=log_weights,
+        )  # fmt: skip
+
+
+def shared_densities(
+    tracks: Tracks,
+    model: TrackingModel,
+    shared: SharedAcceleration,
+    markers: NDArray[np.int64] | None = None,
+) -> NDArray[np.float64]:
+    """Compute the log density of each detection by each component.
+
+    Parameters
+    ----------
+    tracks, model, shared, markers
+        As for `shared_gains`.
+
+    Returns
+    -------
+    ndarray of shape (N, C)
+        -inf for a component without neighbours; NaN for clutter, the first detection of a track,
+        and a track that is of no marker.
+    """
+    d = tracks.detections
+    order, offsets = tracks.by_track
+    kind, F, Q = steps_of(model.motion, d.times)
+    points = with_noise(d.points, d.covariances)
+    of = np.arange(tracks.n_tracks) if markers is None else markers
+    found = np.full((d.n_points, len(COMPONENTS)), np.nan)
+    found[order] = _engine.shared_densities(
+        shared.compiled, motion_model(model, d.n_axes), of.astype(np.int32), points[order],
+        d.frame_of[order], offsets, d.times, kind, F, Q,
+    )  # fmt: skip
+    return found
+
+
+def shared_gains(
+    tracks: Tracks,
+    model: TrackingModel,
+    shared: SharedAcceleration,
+    markers: NDArray[np.int64] | None = None,
+) -> NDArray[np.float64]:
+    """Compute what shared accelerations add to the log density of each detection, in nats.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Partition of the detections into tracks and clutter.
+    model : TrackingModel
+        Model of the markers' own motion.
+    shared : SharedAcceleration
+        How markers accelerate together.
+    markers : array_like of int, shape (K,), optional
+        Marker of each track, -1 for none; by default track k is of marker k. A marker that has
+        detections of two tracks in a frame is no neighbour there.
+
+    Returns
+    -------
+    ndarray of shape (N,)
+        0 for clutter, the first detection of a track, and a track that is of no marker.
+
+    Raises
+    ------
+    ParameterError
+        If there is not one marker for each track.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.person(frames=60, seed=1)
+    >>> model = am.estimate_model(truth.detections).model
+    >>> shared = am.tracking.learn_shared_acceleration(truth, model)
+    >>> bool(am.model.shared_gains(truth, model, shared).sum() > 1000)
+    True
+    """
+    check_kind("tracks", tracks, Tracks, "am.track(detections)")
+    check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
+    check_kind("shared", shared, SharedAcceleration, "am.tracking.learn_shared_acceleration(…)")
+    K = len(shared.weights)
+    of = np.arange(tracks.n_tracks)
+    if markers is not None:
+        of = check_array("markers", markers, ("K",), dtype=np.int64)
+    if len(of) != tracks.n_tracks or (len(of) and not -1 <= of.min() <= of.max() < K):
+        raise ParameterError("markers", f"one of {K} markers for each track, or -1", markers)
+    densities = shared_densities(tracks, model, shared, of)
+    gains = np.zeros(len(densities))
+    has = np.flatnonzero(np.isfinite(densities[:, 0]))
+    log_weights = _log_weights(densities[has], shared.weights[of[tracks.labels[has]]])
+    gains[has] = _log_sum(log_weights + densities[has]) - densities[has, 0]
+    return gains
+
+
+def _log_weights(
+    densities: NDArray[np.float64], weights: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the logarithms of weights, with the sum 1 for the components that there are."""
+    with np.errstate(divide="ignore"):
+        logs = np.where(np.isfinite(densities), np.log(weights), -np.inf)
+    return logs - _log_sum(logs)[:, None]
+
+
+def _log_sum(logs: NDArray[np.float64]) -> NDArray[np.float64]:
+    highest = logs.max(axis=1, initial=-np.inf)
+    return highest + np.log(np.exp(logs - highest[:, None]).sum(axis=1))

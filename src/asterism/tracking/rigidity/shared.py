@@ -1,0 +1,144 @@
+"""Shared accelerations of markers, learnt from the tracks of a capture."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.checks import check_kind
+from asterism.model import TrackingModel, Tracks
+from asterism.model.shared_acceleration import (
+    COMPONENTS,
+    SharedAcceleration,
+    shared_densities,
+)
+from asterism.tracking.rigidity.distances import Distances, distances_between
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["learn_shared_acceleration"]
+
+MAX_FRAMES = 500
+"""Number of evenly spread frames in which distances are measured."""
+MAX_BONDS, MAX_COMPARED = 16, 8
+"""Number of steadiest bonds of a marker, and of those by which the frame of its shape is chosen."""
+MISSING = 4.0
+"""Squared deviation, in variances, that counts for a distance that is missing in a frame, and the
+largest that counts."""
+PRIOR = 20.0
+"""Detections for which the weights of all markers count in those of each marker."""
+ROUNDS = 30
+"""Number of iterations of the weights."""
+
+
+def learn_shared_acceleration(tracks: Tracks, model: TrackingModel) -> SharedAcceleration:
+    """Learn from tracks how their markers accelerate together.
+
+    Bonds are those of all distances, and a marker comes after those of smaller number. Its shape is
+    the positions in the frame whose distances are most usual. The weights of the predictions
+    maximise the density of the detections (EM); those of each marker are drawn to those of all.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks of a capture, most of whose identities are right.
+    model : TrackingModel
+        Model of their own motion.
+
+    Returns
+    -------
+    SharedAcceleration
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.dense(frames=60, seed=1)  # independent
+    >>> model = am.estimate_model(truth.detections).model
+    >>> am.tracking.learn_shared_acceleration(truth, model).weights[:, 0].min()
+    1.0
+    """
+    check_kind("tracks", tracks, Tracks, "am.track(detections)")
+    check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
+    K, D = tracks.n_tracks, tracks.detections.n_axes
+    positions = _sampled(tracks)
+    distances = distances_between(positions)
+    variance = distances.predictive_variance
+    offsets, all_others = [0], [np.empty(0, dtype=np.int64)]
+    shape, own_shape = [np.empty((0, D))], np.zeros((K, D))
+    for k in range(K):
+        others = np.flatnonzero(distances.is_bond[k, :k])
+        others = others[np.argsort(variance[k, others], kind="stable")][:MAX_BONDS]
+        if len(others):
+            usual = _usual_frame(positions, k, others[:MAX_COMPARED], distances)
+            own_shape[k] = positions[usual, k]
+            shape.append(positions[usual, others])
+        all_others.append(others)
+        offsets.append(offsets[-1] + len(others))
+    others = np.concatenate(all_others)
+    marker = np.repeat(np.arange(K), np.diff(offsets))
+    shared = SharedAcceleration(
+        offsets=np.array(offsets), others=others.astype(np.int32),
+        distances=distances.middle[marker, others], variances=variance[marker, others],
+        shape=np.concatenate(shape), own_shape=own_shape,
+        weights=np.ones((K, len(COMPONENTS))) / len(COMPONENTS),
+    )  # fmt: skip
+    densities = shared_densities(tracks, model, shared)
+    weights = _fitted_weights(densities, tracks.labels, K)
+    return SharedAcceleration(
+        offsets=shared.offsets, others=shared.others, distances=shared.distances,
+        variances=shared.variances, shape=shared.shape, own_shape=own_shape, weights=weights,
+    )  # fmt: skip
+
+
+def _sampled(tracks: Tracks) -> NDArray[np.float64]:
+    """Return the positions in up to `MAX_FRAMES` frames, (F, K, D), NaN without a detection."""
+    d = tracks.detections
+    n = min(MAX_FRAMES, d.n_frames)
+    number = np.full(d.n_frames, -1)
+    number[np.arange(n) * d.n_frames // max(n, 1)] = np.arange(n)
+    used = np.flatnonzero((tracks.labels >= 0) & (number[d.frame_of] >= 0))
+    found = np.full((n, tracks.n_tracks, d.n_axes), np.nan)
+    found[number[d.frame_of[used]], tracks.labels[used]] = d.points[used]
+    return found
+
+
+def _usual_frame(
+    positions: NDArray[np.float64], k: int, others: NDArray[np.int64], distances: Distances
+) -> int:
+    """Return the frame in which the distances of marker k deviate least from the usual ones."""
+    apart = np.sqrt(((positions[:, others] - positions[:, [k]]) ** 2).sum(axis=2))
+    off = apart - distances.middle[k, others]
+    squares = np.minimum(off**2 / distances.predictive_variance[k, others], MISSING)
+    sums = np.nan_to_num(squares, nan=MISSING).sum(axis=1)
+    sums[~np.isfinite(positions[:, k, 0])] = np.inf
+    return int(sums.argmin())
+
+
+def _fitted_weights(
+    densities: NDArray[np.float64], labels: NDArray[np.int64], n_markers: int
+) -> NDArray[np.float64]:
+    """Return the weights of the components for each marker, which maximise the density."""
+    n = densities.shape[1]
+    has = np.isfinite(densities).sum(axis=1) > 1
+    densities, labels = densities[has], labels[has]
+    alone = np.zeros((n_markers, n))
+    alone[:, 0] = 1.0
+    if not len(labels):
+        return alone
+    relative = np.exp(densities - densities.max(axis=1, keepdims=True))
+    common = np.full(n, 1 / n)
+    for _ in range(ROUNDS):
+        share = relative * common
+        share /= share.sum(axis=1, keepdims=True)
+        common = share.mean(axis=0)
+    weights = np.tile(common, (n_markers, 1))
+    for _ in range(ROUNDS):
+        share = relative * weights[labels]
+        share /= share.sum(axis=1, keepdims=True)
+        sums = np.stack(
+            [np.bincount(labels, each, minlength=n_markers) for each in share.T], axis=1
+        )
+        weights = (sums + PRIOR * common) / (sums.sum(axis=1, keepdims=True) + PRIOR)
+    return weights

@@ -1,0 +1,305 @@
+"""Markers that accelerate together: the density, what is learnt, and the chain that samples it."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+
+import numpy as np
+import pytest
+
+import asterism as am
+from asterism.errors import ParameterError
+from asterism.model import SharedAcceleration
+from asterism.model.shared_acceleration import COMPONENTS, shared_densities
+from tests.references import shared_acceleration as reference
+from tests.references.chain_moves import as_partition, make_chain
+from tests.scenes import interacting, small_model
+
+WEIGHTS = np.array([0.05, 0.2, 0.1, 0.2, 0.1, 0.05, 0.2, 0.1])
+
+
+def segments(rng, sizes, n_frames, *, n_axes=3, jump=0.05, own=0.002, turn=0.1):
+    """Positions (T, K, D) of segments that turn and jump, and the shape of each marker."""
+    places, shapes = [], []
+    for number, size in enumerate(sizes):
+        shape = rng.normal(0, 0.1, (size, n_axes))
+        at, angle, velocity = rng.normal(0, 0.1, n_axes) + number, 0.0, np.zeros(n_axes)
+        track = []
+        for _ in range(n_frames):
+            velocity = 0.5 * velocity + rng.normal(0, jump, n_axes)
+            at, angle = at + velocity, angle + rng.normal(0, turn)
+            R = np.eye(n_axes)
+            R[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+            track.append(shape @ R.T + at + rng.normal(0, own, (size, n_axes)))
+        places.append(np.array(track))
+        shapes.append(shape)
+    return np.concatenate(places, axis=1), shapes
+
+
+def made_by_hand(shapes, weights=WEIGHTS, *, unknown=()):
+    """A `SharedAcceleration` with a bond of each marker to all before it in its segment."""
+    offsets, others, of, own = [0], [], [], []
+    first = 0
+    for shape in shapes:
+        for k in range(len(shape)):
+            others += list(range(first, first + k))
+            of += [np.full(shape.shape[1], np.nan) if j in unknown else shape[j] for j in range(k)]
+            own.append(shape[k])
+            offsets.append(len(others))
+        first += len(shape)
+    own = np.array(own)
+    marker = np.repeat(np.arange(len(own)), np.diff(offsets))
+    distances = np.linalg.norm(own[marker] - own[others], axis=1)
+    return SharedAcceleration(
+        offsets=np.array(offsets), others=np.array(others, dtype=np.int32), distances=distances,
+        variances=2e-6 + (0.01 * distances) ** 2 * (1 + marker), own_shape=own,
+        shape=np.reshape(of, (-1, own.shape[1])), weights=np.tile(weights, (len(own), 1)),
+    )  # fmt: skip
+
+
+def tracks_of(rng, places, *, missing=0.1, extra=None):
+    """Tracks of the positions, in which some detections are missing."""
+    kept = rng.random(places.shape[:2]) >= missing
+    kept[:2] = True
+    T = len(places)
+    labels = np.concatenate([np.flatnonzero(row) for row in kept])
+    points = np.concatenate([each[row] for each, row in zip(places, kept, strict=True)])
+    offsets = np.append(0, np.cumsum(kept.sum(axis=1)))
+    covariances = None
+    if extra is not None:
+        covariances = rng.uniform(0, extra, (len(points), 1, 1)) * np.eye(places.shape[2])
+    d = am.Detections(
+        times=0.1 * np.arange(T), offsets=offsets, points=points, covariances=covariances
+    )
+    return am.Tracks(detections=d, labels=labels)
+
+
+MODELS = {"one motion": small_model(), "several": small_model(motion=interacting())}
+
+
+@pytest.mark.parametrize("n_axes", [2, 3])
+@pytest.mark.parametrize("model", list(MODELS.values()), ids=list(MODELS))
+@pytest.mark.parametrize("extra", [None, 1e-4], ids=["same noise", "own noise"])
+def test_densities_are_those_of_the_reference(n_axes, model, extra):
+    rng = np.random.default_rng(n_axes)
+    places, shapes = segments(rng, (8, 4, 1), 12, n_axes=n_axes)
+    tracks = tracks_of(rng, places, missing=0.25, extra=extra)
+    shared = made_by_hand(shapes, unknown=(1,))
+    # Track 3 is of no marker, and track 4 of a marker that track 5 is of as well.
+    markers = np.arange(13)
+    markers[3], markers[4] = -1, 5
+    found = shared_densities(tracks, model, shared, markers)
+    expected = reference.densities(tracks.detections, model, shared, tracks.labels, markers)
+    assert np.array_equal(np.isnan(found), np.isnan(expected))
+    np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-7)
+    assert np.isfinite(found).sum(axis=0).min() >= 8  # every component is there somewhere
+    gains = am.model.shared_gains(tracks, model, shared, markers)
+    for i in range(len(gains)):
+        has = np.isfinite(expected[i, 0])
+        by_hand = reference.gains(expected[i], WEIGHTS) if has else 0.0
+        assert gains[i] == pytest.approx(by_hand, rel=1e-7, abs=1e-7)
+
+
+def test_the_density_of_a_detection_has_the_integral_1():
+    rng = np.random.default_rng(3)
+    places, shapes = segments(rng, (5,), 5, n_axes=2, jump=0.02)
+    model, shared = small_model(), made_by_hand(shapes)
+    grid = places[-1, -1] + np.stack(
+        np.meshgrid(*[np.linspace(-0.6, 0.6, 241)] * 2), axis=-1
+    ).reshape(-1, 2)
+    tracks = tracks_of(rng, places, missing=0)
+    total = 0.0
+    cell = (1.2 / 240) ** 2
+    for y in grid[np.linalg.norm(grid - places[-1, -1], axis=1) < 0.25][::4]:
+        points = tracks.detections.points.copy()
+        points[-1] = y
+        moved = dataclasses.replace(
+            tracks, detections=dataclasses.replace(tracks.detections, points=points)
+        )
+        own = shared_densities(moved, model, shared)[-1, 0]
+        total += np.exp(own + am.model.shared_gains(moved, model, shared)[-1]) * cell * 4
+    assert total == pytest.approx(1, abs=0.03)
+
+
+def test_markers_of_a_segment_are_learnt_to_move_together_and_others_not():
+    rng = np.random.default_rng(4)
+    places, _ = segments(rng, (8,), 400, jump=0.03, own=1e-3)
+    walk = rng.normal(0, 0.03, (400, 4, 3)).cumsum(axis=0) + 2
+    tracks = tracks_of(rng, np.concatenate([places, walk], axis=1), missing=0.05)
+    model = small_model(noise_sigma=1e-3)
+    shared = am.tracking.learn_shared_acceleration(tracks, model)
+    assert (np.diff(shared.offsets)[1:8] == np.arange(1, 8)).all()
+    assert (np.diff(shared.offsets)[8:] == 0).all()
+    assert (shared.weights[4:8, 0] < 0.05).all()
+    np.testing.assert_allclose(shared.weights.sum(axis=1), 1)
+    gains = am.model.shared_gains(tracks, model, shared)
+    assert not gains[tracks.labels >= 8].any()
+    of_segment = gains[(tracks.labels >= 3) & (tracks.labels < 8)]
+    assert of_segment.mean() > 3
+
+
+def test_weights_are_those_from_which_detections_were_drawn():
+    """Field accelerations with known shares: each is learnt within three standard errors."""
+    rng = np.random.default_rng(5)
+    densities = rng.normal(0, 3, (20_000, len(COMPONENTS)))
+    # Draw the component of each detection, and reject: p(c | densities) ∝ w_c exp(density).
+    from asterism.tracking.rigidity.shared import _fitted_weights
+
+    weights = WEIGHTS / WEIGHTS.sum()
+    mixture = np.exp(densities) @ weights / np.exp(densities).mean(axis=1)
+    kept = rng.random(len(densities)) < mixture / mixture.max()
+    found = _fitted_weights(densities[kept], np.zeros(int(kept.sum()), dtype=np.int64), 1)[0]
+    share = np.exp(densities[kept]) * weights
+    share /= share.sum(axis=1, keepdims=True)
+    information = (share / weights).T @ (share / weights)
+    error = np.sqrt(np.diag(np.linalg.inv(information)))
+    assert (np.abs(found - weights) < 3 * error + 1e-3).all()
+
+
+class Enumerated:
+    """All partitions of the last frames, given the tracks before, with their posteriors."""
+
+    def __init__(self, tracks, model, shared, n_open) -> None:
+        self.tracks, self.model, self.shared = tracks, model, shared
+        d = tracks.detections
+        self.first = d.n_frames - n_open
+        self.settled = np.where(d.frame_of < self.first, tracks.labels, -1)
+        self.found: dict[frozenset, float] = {}
+        self._extend(self.first, self.settled)
+        totals = np.array(list(self.found.values()))
+        p = np.exp(totals - totals.max())
+        self.p = dict(zip(self.found, p / p.sum(), strict=True))
+
+    def _extend(self, t, labels) -> None:
+        d = self.tracks.detections
+        if t == d.n_frames:
+            return self._score(labels)
+        here = np.arange(d.offsets[t], d.offsets[t + 1])
+        K = self.tracks.n_tracks
+        # Labels from K on are of tracks that begin in the open frames: one for each detection.
+        begun = K + np.flatnonzero(d.frame_of[: here[0]] >= self.first)
+        choices = [[-1, *range(K), *begun, K + i] for i in here]
+        for chosen in itertools.product(*choices):
+            used = [c for c in chosen if c >= 0]
+            if len(set(used)) == len(used):
+                after = labels.copy()
+                after[here] = chosen
+                self._extend(t + 1, after)
+        return None
+
+    def _score(self, labels) -> None:
+        kept = np.flatnonzero(labels >= 0)
+        values, counts = np.unique(labels[kept], return_counts=True)
+        if (counts < 2).any():
+            return
+        number = {v: k for k, v in enumerate(values.tolist())}
+        dense = np.array([number.get(v, -1) for v in labels.tolist()])
+        tracks = am.Tracks(detections=self.tracks.detections, labels=dense)
+        own = am.log_posterior(tracks, self.model)
+        if np.isfinite(own):
+            firsts = np.array([np.flatnonzero(dense == k)[0] for k in range(tracks.n_tracks)], int)
+            markers = self.tracks.labels[firsts]
+            gain = am.model.shared_gains(tracks, self.model, self.shared, markers).sum()
+            self.found[frozenset(as_partition(dense))] = own + gain
+
+    def total_variation(self, n_moves, *, with_shared=True, seed=0):
+        d = self.tracks.detections
+        chain = make_chain(d, self.model, informed=True, seed=seed)
+        chain.assign(self.settled)
+        if with_shared:
+            chain.give(self.tracks.labels, self.shared.compiled)
+        chain.freeze(self.first - 1)
+        chain.run(1000)
+        labels, counts = chain.visits(n_moves)
+        visited = {
+            frozenset(as_partition(w)): n / n_moves for w, n in zip(labels, counts, strict=True)
+        }
+        assert set(visited) <= set(self.p)
+        return 0.5 * sum(abs(p - visited.get(w, 0)) for w, p in self.p.items())
+
+
+def two_segments(seed):
+    """Two segments of three markers that meet: three open detections of each, and clutter."""
+    rng = np.random.default_rng(seed)
+    places, shapes = segments(rng, (3, 3), 5, n_axes=2, jump=0.08, own=0.004, turn=0.3)
+    places[:, 3:] += places[-1, :1] - places[-1, 3:4] + 0.08
+    return rng, places, shapes
+
+
+FAST = am.DWNA(acceleration_sigma=20.0, velocity_sigma=0.8)
+
+
+@pytest.mark.parametrize("seed", [1, 4, 6])
+def test_the_chain_samples_two_segments_as_enumerated(seed):
+    rng, places, shapes = two_segments(seed)
+    tracks = tracks_of(rng, places[:, [0, 1, 2, 3, 4]], missing=0)
+    shared = made_by_hand([shapes[0], shapes[1][:2]])
+    problem = Enumerated(tracks, small_model(motion=FAST, max_speed=8.0), shared, 1)
+    assert len(problem.p) > 100
+    assert problem.total_variation(300_000) < 0.01
+    assert problem.total_variation(300_000, with_shared=False) > 0.3
+
+
+@pytest.mark.parametrize("seed", [2, 4, 6])
+def test_the_chain_samples_two_open_frames_as_enumerated(seed):
+    """A change in one frame changes the terms of later ones, and tracks may begin."""
+    rng, places, shapes = two_segments(seed)
+    tracks = tracks_of(rng, places[:, :3], missing=0)
+    model = small_model(motion=FAST, max_speed=8.0)
+    problem = Enumerated(tracks, model, made_by_hand(shapes[:1]), 2)
+    assert len(problem.p) > 300
+    assert problem.total_variation(300_000) < 0.01
+    assert problem.total_variation(300_000, with_shared=False) > 0.3
+
+
+def test_mcmcda_keeps_fast_segments_apart_by_their_acceleration():
+    rng = np.random.default_rng(7)
+    places, _ = segments(rng, (7, 7), 150, jump=0.08, own=1e-3, turn=0.2)
+    places[:, 7:] += places[:, :1] - places[:, 7:8] + 0.15  # they move through each other
+    truth = tracks_of(rng, places, missing=0.05)
+    model = small_model(
+        noise_sigma=1e-3, motion=am.DWNA(acceleration_sigma=15.0, velocity_sigma=1.0), max_speed=8.0
+    )
+    shared = am.tracking.learn_shared_acceleration(truth, model)
+    method = am.MCMCDA(moves=20, confidence=0)
+    scores = []
+    for given in (None, shared):
+        state = method.init(model, seed=1, start=truth.labels, shared=given)
+        _, labels, _ = method.run(state, truth.detections)
+        found = am.Tracks(detections=truth.detections, labels=labels)
+        scores.append(am.evaluate(found, truth).idf1)
+    assert scores[1] > scores[0] + 0.1
+
+
+def test_the_result_is_the_same_for_any_number_of_threads():
+    rng = np.random.default_rng(8)
+    places, _ = segments(rng, (6, 6), 60, jump=0.08, own=1e-3)
+    truth = tracks_of(rng, places, missing=0.05)
+    model = small_model(
+        noise_sigma=1e-3, motion=am.DWNA(acceleration_sigma=15.0, velocity_sigma=1.0), max_speed=8.0
+    )
+    shared = am.tracking.learn_shared_acceleration(truth, model)
+    found = []
+    for threads in (1, 2):
+        method = am.MCMCDA(moves=5, confidence=5, threads=threads, chains=2)
+        state = method.init(model, seed=1, start=truth.labels, shared=shared)
+        found.append(method.run(state, truth.detections)[1:])
+    assert np.array_equal(found[0][0], found[1][0])
+    assert np.array_equal(found[0][1], found[1][1])
+
+
+def test_mistakes_are_told():
+    truth = am.simulate.person(frames=40, seed=1)
+    model = am.estimate_model(truth.detections).model
+    shared = am.tracking.learn_shared_acceleration(truth, model)
+    with pytest.raises(ParameterError, match="window"):
+        am.MCMCDA(window=None).init(model, start=truth.labels, shared=shared)
+    with pytest.raises(ParameterError, match="one marker for each label"):
+        am.MCMCDA().init(model, start=truth.labels + 1, shared=shared)
+    with pytest.raises(ParameterError, match="shared"):
+        am.MCMCDA().init(model, start=truth.labels, shared=3)
+    with pytest.raises(ParameterError, match="markers"):
+        am.model.shared_gains(truth, model, shared, np.zeros(3, dtype=int))
+    with pytest.raises(ParameterError, match="markers"):
+        am.model.shared_gains(truth, model, shared, np.full(truth.n_tracks, 99))
