@@ -52,8 +52,11 @@ void SharedAcceleration::with_neighbours(const OwnMotion& own, const Link& link,
     const Field found = field({sight.arms.data(), sight.n_arms}, sight.squares / n, own.r);
     Point place = own.center;
     for (int d = 0; d < D_; ++d) place[d] += found.acceleration[d];
-    for (std::size_t k = 0; k < kField.size(); ++k)
-      out[1 + k] = own_density(combined(own, place, found.noise + kField[k] * own.S), y);
+    for (std::size_t k = 0; k < kField.size(); ++k) {
+      const double variance = kField[k] * own.S;
+      out[1 + k] = own_density(combined(own, own.center, variance), y);
+      out[kStart + k] = own_density(combined(own, place, found.noise + variance), y);
+    }
   }
   // Both rigid motions are fitted at once.
   struct Motion {
@@ -82,7 +85,7 @@ void SharedAcceleration::with_neighbours(const OwnMotion& own, const Link& link,
     for (std::size_t k = 0; k < kRigid.size(); ++k)
       out[first + k] = own_density(combined(before, rigid.at, kRigid[k] * rigid.variance), y);
   };
-  add_rigid(own, 1 + kField.size());
+  add_rigid(own, kTurn);
   if (!has_shape) return;
   const OwnMotion shaped = combined(own, shape.at, shape.variance);
   out[kShape] = own_density(shaped, y);

@@ -6,13 +6,15 @@
 // of kComponents predictions, with weights that are learnt for each marker:
 //
 //   own    by the marker's own motion: ŷ_m with variance P_m + r in mode m
+//   still  own, and the place ŷ with the variance β S, for two β: no acceleration. Where neighbours
+//          tell nothing, these are as good as the next ones.
 //   field  own, and the acceleration of the segment at the marker. That of neighbour j is
 //          a_j = y_j(t) - 2 y_j(t-1) + y_j(t-2). An affine field is fitted to them:
 //            a(x) = c₀ + C x / (l √2),  Σ_j |a_j - a(x_j)|² + λ (|c₀|² + |C|²) minimal
 //          x_j  position of neighbour j relative to the marker, in frame t-1
 //          l    root mean square of their distances
 //          At the marker it is Σ w_j a_j. The place ŷ + Σ w_j a_j has the variance
-//          6 r Σ w_j² + β S, where S is the variance of the own prediction, for two β.
+//          6 r Σ w_j² + β S, where S is the variance of the own prediction.
 //   rigid  own, and the place to which the rigid motion of the neighbours since the marker's last
 //          detection carries it (rigid/carried.hpp), with its variance times two factors
 //   shape  own and rigid, and the place that the marker has in the shape of the segment: the rigid
@@ -65,8 +67,9 @@ class SharedAcceleration {
  public:
   static constexpr std::array<double, 2> kField{0.1, 0.5};   // β
   static constexpr std::array<double, 2> kRigid{0.25, 1};    // factors of the variance
-  // Own, field and rigid; then own and rigid with the shape.
-  static constexpr std::size_t kShape = 1 + kField.size() + kRigid.size();
+  // Own, still, field and rigid; then own and rigid with the shape.
+  static constexpr std::size_t kStart = 1 + kField.size(), kTurn = kStart + kField.size();
+  static constexpr std::size_t kShape = kTurn + kRigid.size();
   static constexpr std::size_t kComponents = kShape + 1 + kRigid.size();
   using Densities = std::array<double, kComponents>;
 

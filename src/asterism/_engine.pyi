@@ -470,7 +470,7 @@ def judge_distances(
 # (R, from, to, rms): b = R (a - from) + to, in three axes.
 def fit_rigid(a: Floats, b: Floats, weights: Floats) -> tuple[Floats, Floats, Floats, float]: ...
 
-# Bonds of marker k: offsets[k] to offsets[k + 1]. Shapes (B, D) and (K, D); log weights (K, 8).
+# Bonds of marker k: offsets[k] to offsets[k + 1]. Shapes (B, D) and (K, D); log weights (K, 10).
 class SharedAcceleration:
     def __init__(
         self,
@@ -484,7 +484,7 @@ class SharedAcceleration:
         log_weights: Floats,
     ) -> None: ...
 
-# Log densities (N, 8) of the detections of tracks, of which each is of a marker or -1.
+# Log densities (N, 10) of the detections of tracks, of which each is of a marker or -1.
 def shared_densities(
     shared: SharedAcceleration,
     model: MotionModel,

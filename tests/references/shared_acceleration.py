@@ -119,8 +119,8 @@ def carried(a, b, v, then, r: float):
 
 
 def densities(d, model, shared, labels, markers):
-    """Log densities (N, 8) of the detections of tracks, of which each is of a marker or -1."""
-    found = np.full((d.n_points, 8), np.nan)
+    """Log densities (N, 10) of the detections of tracks, of which each is of a marker or -1."""
+    found = np.full((d.n_points, 10), np.nan)
     kind, F, Q = steps_of(model.motion, d.times)
     r, D = model.sensor.noise_sigma**2, d.n_axes
     seen: dict[tuple[int, int], list[int]] = {}
@@ -154,7 +154,7 @@ def densities(d, model, shared, labels, markers):
 
 def _of_detection(shared, marker, own, then, y, when, place, r, extra):
     s, t, is_moving = when
-    out = np.full(8, -np.inf)
+    out = np.full(10, -np.inf)
     out[0] = own.density(y, r + extra)
     pairs, shape, arms = [], [], []
     for b in range(shared.offsets[marker], shared.offsets[marker + 1]):
@@ -174,20 +174,22 @@ def _of_detection(shared, marker, own, then, y, when, place, r, extra):
         x, a, length = (np.array(each) for each in zip(*arms, strict=True))
         step, squares = field_at(x, a, float((length**2).mean()))
         for k, beta in enumerate(FIELD):
-            variance = 6 * r * squares + beta * own.variance(r)
-            out[1 + k] = own.with_place(own.center() + step, variance).density(y, r + extra)
+            variance = beta * own.variance(r)
+            out[1 + k] = own.with_place(own.center(), variance).density(y, r + extra)
+            variance += 6 * r * squares
+            out[3 + k] = own.with_place(own.center() + step, variance).density(y, r + extra)
     rigid = None
     if len(pairs) >= len(y):
         rigid = carried(*(np.array(each) for each in zip(*pairs, strict=True)), then, r)
         for k, factor in enumerate(RIGID):
-            out[3 + k] = own.with_place(rigid[0], factor * rigid[1]).density(y, r + extra)
+            out[5 + k] = own.with_place(rigid[0], factor * rigid[1]).density(y, r + extra)
     if len(shape) >= len(y):
         a, b, v = (np.array(each) for each in zip(*shape, strict=True))
         formed = own.with_place(*carried(a, b, v, shared.own_shape[marker], r))
-        out[5] = formed.density(y, r + extra)
+        out[7] = formed.density(y, r + extra)
         for k, factor in enumerate(RIGID):
             if rigid is not None:
-                out[6 + k] = formed.with_place(rigid[0], factor * rigid[1]).density(y, r + extra)
+                out[8 + k] = formed.with_place(rigid[0], factor * rigid[1]).density(y, r + extra)
     return out
 
 

@@ -7,9 +7,10 @@ number:
     log π(ω) + Σ gain(y),  gain(y) = log Σ_c w_c p_c(y) - log p(y)
 
 p is the density by the marker's own motion, which `track_scores` has, and p_c are the `COMPONENTS`:
-that density, and those in which the position is also predicted by the acceleration or by the rigid
-motion of neighbours (`engine/rigid/shared_acceleration.hpp` has the formulas). The weights w_c are
-learnt for each marker. A marker that moves independently has the weight 1 of its own motion.
+that density, two with a smaller variance, and those in which the position is also predicted by the
+acceleration or by the rigid motion of neighbours (`engine/rigid/shared_acceleration.hpp` has the
+formulas). The weights w_c are learnt for each marker. Those of a marker that moves independently
+are of its own motion alone, the first `N_OWN`.
 """
 
 from __future__ import annotations
@@ -33,10 +34,12 @@ if TYPE_CHECKING:
 __all__ = ["COMPONENTS", "SharedAcceleration", "shared_gains"]
 
 COMPONENTS = (
-    "own", "field 0.1", "field 0.5", "rigid 0.25", "rigid 1", "shape", "shape, rigid 0.25",
-    "shape, rigid 1",
+    "own", "still 0.1", "still 0.5", "field 0.1", "field 0.5", "rigid 0.25", "rigid 1", "shape",
+    "shape, rigid 0.25", "shape, rigid 1",
 )  # fmt: skip
 """Predictions of a detection, with the factors of their variances."""
+N_OWN = 3
+"""Number of the first components, which do not depend on neighbours."""
 
 
 @record(eq=False)
@@ -68,7 +71,7 @@ class SharedAcceleration:
     >>> model = am.estimate_model(truth.detections).model
     >>> shared = am.tracking.learn_shared_acceleration(truth, model)
     >>> shared
-    SharedAcceleration(53 markers, 704 bonds, weight of own motion 0.00)
+    SharedAcceleration(53 markers, 704 bonds, weight of own motion 0.06)
     """
 
     offsets: NDArray[np.int64]
@@ -80,7 +83,7 @@ class SharedAcceleration:
     weights: NDArray[np.float64]
 
     def __repr__(self) -> str:
-        own = float(self.weights[:, 0].mean()) if len(self.weights) else 1.0
+        own = float(self.weights[:, :N_OWN].sum(axis=1).mean()) if len(self.weights) else 1.0
         return (
             f"SharedAcceleration({len(self.weights)} markers, {len(self.others)} bonds, weight of "
             f"own motion {own:.2f})"

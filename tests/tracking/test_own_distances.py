@@ -1,0 +1,54 @@
+"""Tracks that are changed by the distances which they keep to each other."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+import asterism as am
+from asterism.tracking import own_distances
+from asterism.tracking.methods import TOMHT, Rigidity, options_of
+from asterism.tracking.plan import plan_tracking
+from asterism.tracking.uncorrected import Uncorrected
+
+HIDDEN, FIRST, LAST = (3, 4), 60, 100
+
+
+def followed_through_a_gap():
+    """A person, two of whose markers are hidden for 40 frames and exchanged afterwards."""
+    person = am.simulate.person(frames=160, seed=2)
+    d, labels = person.detections, person.labels.copy()
+    hidden = np.isin(labels, HIDDEN) & (d.frame_of >= FIRST) & (d.frame_of < LAST)
+    labels[hidden] = -1
+    after = d.frame_of >= LAST
+    one, other = (after & (labels == k) for k in HIDDEN)
+    labels[one], labels[other] = HIDDEN[::-1]
+    model = am.tracking.tracklet_model(am.estimate_model(d).model)
+    recipe = dataclasses.replace(
+        plan_tracking(d).recipe, method="tomht", options=options_of(TOMHT(rigid=Rigidity()))
+    )
+    tracks = am.Tracks(detections=d, labels=labels)
+    # As a method with bonds leaves it: one tracklet on both sides of the gap.
+    stitching = am.tracking.Stitching(
+        tracks=tracks, tracklets=labels.astype(np.int32),
+        markers=np.arange(tracks.n_tracks, dtype=np.int32),
+        after=np.full(tracks.n_tracks, -1, dtype=np.int32),
+        probabilities=np.ones(tracks.n_tracks), cuts=np.empty((0, 2), dtype=np.int64),
+    )  # fmt: skip
+    return person, Uncorrected(tracks=tracks, recipe=recipe, model=model, stitching=stitching)
+
+
+def test_tracks_are_cut_at_gaps_that_the_model_excludes_and_keep_their_labels():
+    person, found = followed_through_a_gap()
+    again = own_distances._stitched_again(found)
+    assert len(found.stitching.joins) == 0
+    assert len(again.stitching.joins) == len(HIDDEN)
+    np.testing.assert_array_equal(again.tracks.labels, found.tracks.labels)
+    in_tracks = again.tracks.labels >= 0
+    frame_of = person.detections.frame_of
+    for k in range(int(again.stitching.tracklets.max()) + 1):
+        own = frame_of[in_tracks & (again.stitching.tracklets == k)]
+        assert np.diff(own).max(initial=0) <= found.model.population.max_gap
+    no_stitching = dataclasses.replace(found, stitching=None)
+    assert own_distances._stitched_again(no_stitching) is no_stitching
