@@ -299,6 +299,8 @@ def test_mistakes_are_told():
         am.MCMCDA().init(model, start=truth.labels + 1, shared=shared)
     with pytest.raises(ParameterError, match="shared"):
         am.MCMCDA().init(model, start=truth.labels, shared=3)
+    with pytest.raises(ParameterError, match="without labels"):
+        am.MCMCDA().init(model, shared=shared)
     with pytest.raises(ParameterError, match="markers"):
         am.model.shared_gains(truth, model, shared, np.zeros(3, dtype=int))
     with pytest.raises(ParameterError, match="markers"):

@@ -13,6 +13,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -121,6 +122,7 @@ class SharedTerm {
   }
   static void remove(std::vector<Point>& at, const Point& y) {
     const auto found = std::ranges::find(at, y);
+    assert(found != at.end());
     *found = at.back();
     at.pop_back();
   }

@@ -244,8 +244,8 @@ class MCMCDA(EngineMethod):
         Raises
         ------
         ParameterError
-            If no track can start, neither by a move nor from a label, or `shared` is of other
-            labels, or of a whole capture with ``window=None``.
+            If no track can start, neither by a move nor from a label, or `shared` is without labels
+            or of others, or for ``window=None``.
 
         Examples
         --------
@@ -261,6 +261,8 @@ class MCMCDA(EngineMethod):
         if self.moves == 0 and start is None:
             hint = "use gnn to associate frame by frame without moves"
             raise ParameterError("moves", "a number > 0, or labels to start from", "0", hint)
+        if shared is not None and start is None:
+            raise ParameterError("shared", "none without labels to start from", repr(shared))
         state = super().init(model, n_axes=n_axes, seed=seed)
         if start is not None:
             labels = check_array("start", start, ("N",), dtype=np.int64)
