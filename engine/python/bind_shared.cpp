@@ -1,4 +1,6 @@
 // Bindings of the density of markers that accelerate together.
+#include <nanobind/stl/tuple.h>
+
 #include <algorithm>
 #include <limits>
 #include <utility>
@@ -49,7 +51,8 @@ void make_shared_acceleration(SharedAcceleration* self, const In<std::int64_t>& 
          b < static_cast<std::size_t>(offsets.data()[k + 1]); ++b) {
       const std::int32_t other = others.data()[b];
       require(other >= 0 && other < static_cast<std::int64_t>(k), "others: markers before it");
-      marker.before.push_back({other, 1 / variances.data()[b], distances.data()[b], point_of(shape, b)});
+      marker.before.push_back(
+          {other, 1 / variances.data()[b], distances.data()[b], point_of(shape, b)});
     }
   }
   new (self) SharedAcceleration(static_cast<int>(own_shape.shape(1)), std::move(markers));
@@ -88,9 +91,10 @@ class MarkerPlaces {
   std::vector<Place> places_;
 };
 
-// The log densities (N, components) of the detections of tracks. Each track is of a marker, -1 for
-// none. The first detection of a track has none, and gets NaN, as those of no marker.
-Out<double> shared_densities(const SharedAcceleration& shared, const MotionModel& m,
+// The log densities (N, components) of the detections of tracks, and the predicted positions and
+// variances, (N, D + 1). Each track is of a marker, -1 for none. The first detection of a track has
+// none, and gets NaN, as those of no marker.
+nb::tuple shared_densities(const SharedAcceleration& shared, const MotionModel& m,
                              const In<std::int32_t>& markers, const In<double>& points,
                              const In<std::int64_t>& frames, const In<std::int64_t>& offsets,
                              const In<double>& times, const In<std::int32_t>& kind,
@@ -100,12 +104,16 @@ Out<double> shared_densities(const SharedAcceleration& shared, const MotionModel
   require(shared.n_axes() == m.axis.D, "shared: as many axes as the model");
   require(markers.size() == tracks.n_tracks(), "markers: one for each track");
   require_within(flat(markers), -1, static_cast<std::int32_t>(shared.size()), "markers: known ones");
-  Owned<double> out(tracks.points.size() * kShared);
+  const auto D = static_cast<std::size_t>(m.axis.D);
+  Owned<double> out(tracks.points.size() * kShared), predicted(tracks.points.size() * (D + 1));
   {
     nb::gil_scoped_release release;
-    std::fill_n(out.data.get(), tracks.points.size() * kShared, std::numeric_limits<double>::quiet_NaN());
-    const MarkerPlaces places(tracks, flat(markers), shared.size(), static_cast<std::int64_t>(times.size()));
-    SharedAcceleration::Densities each;
+    constexpr double none = std::numeric_limits<double>::quiet_NaN();
+    std::fill_n(out.data.get(), tracks.points.size() * kShared, none);
+    std::fill_n(predicted.data.get(), tracks.points.size() * (D + 1), none);
+    const auto n_frames = static_cast<std::int64_t>(times.size());
+    const MarkerPlaces places(tracks, flat(markers), shared.size(), n_frames);
+    SharedAcceleration::Mixture mixture;
     SharedAcceleration::Memory memory;
     for (std::size_t k = 0; k < tracks.n_tracks(); ++k) {
       const auto own = tracks.points_of(k);
@@ -116,15 +124,19 @@ Out<double> shared_densities(const SharedAcceleration& shared, const MotionModel
       for (std::size_t i = 1; i < own.size(); ++i) {
         for (std::int64_t t = at[i - 1] + 1; t <= at[i]; ++t) predict(m, line.step(t), state);
         const Prediction prediction(m, state);
-        shared.densities(OwnMotion(prediction, m.axis.r),
-                         {marker, at[i - 1], at[i], own[i - 1], own[i], i > 1}, places, memory, each);
+        shared.predict(OwnMotion(prediction, m.axis.r),
+                       {marker, at[i - 1], at[i], own[i - 1], own[i], i > 1}, places, memory, mixture);
         update(m, prediction, own[i], state);
         const std::size_t row = static_cast<std::size_t>(tracks.offsets[k]) + i;
-        std::ranges::copy(each, out.data.get() + row * kShared);
+        std::ranges::copy(shared.densities(mixture, own[i]), out.data.get() + row * kShared);
+        const SharedAcceleration::Moments moments = shared.moments(marker, mixture);
+        std::copy_n(moments.at.begin(), D, predicted.data.get() + row * (D + 1));
+        predicted.data[row * (D + 1) + D] = moments.variance;
       }
     }
   }
-  return out.give({tracks.points.size(), kShared});
+  return nb::make_tuple(out.give({tracks.points.size(), kShared}),
+                        predicted.give({tracks.points.size(), D + 1}));
 }
 
 }  // namespace

@@ -44,8 +44,7 @@ double normalise(std::span<double> logs) {
 }  // namespace
 
 void SharedAcceleration::with_neighbours(const OwnMotion& own, const Link& link, const Sight& sight,
-                                         Memory& memory, Densities& out) const {
-  const Point& y = link.now;
+                                         Memory& memory, Mixture& out) const {
   const std::size_t n_min = min_for_rotation(D_);
   if (sight.n_arms > 0) {
     const double n = static_cast<double>(sight.n_arms);
@@ -54,8 +53,8 @@ void SharedAcceleration::with_neighbours(const OwnMotion& own, const Link& link,
     for (int d = 0; d < D_; ++d) place[d] += found.acceleration[d];
     for (std::size_t k = 0; k < kField.size(); ++k) {
       const double variance = kField[k] * own.S;
-      out[1 + k] = own_density(combined(own, own.center, variance), y);
-      out[kStart + k] = own_density(combined(own, place, found.noise + variance), y);
+      out.set(1 + k, combined(own, own.center, variance));
+      out.set(kStart + k, combined(own, place, found.noise + variance));
     }
   }
   // Both rigid motions are fitted at once.
@@ -83,13 +82,42 @@ void SharedAcceleration::with_neighbours(const OwnMotion& own, const Link& link,
   const auto add_rigid = [&](const OwnMotion& before, std::size_t first) {
     if (sight.n < n_min) return;
     for (std::size_t k = 0; k < kRigid.size(); ++k)
-      out[first + k] = own_density(combined(before, rigid.at, kRigid[k] * rigid.variance), y);
+      out.set(first + k, combined(before, rigid.at, kRigid[k] * rigid.variance));
   };
   add_rigid(own, kTurn);
   if (!has_shape) return;
   const OwnMotion shaped = combined(own, shape.at, shape.variance);
-  out[kShape] = own_density(shaped, y);
+  out.set(kShape, shaped);
   add_rigid(shaped, kShape + 1);
+}
+
+SharedAcceleration::Densities SharedAcceleration::densities(const Mixture& mixture,
+                                                            const Point& y) const {
+  Densities out;
+  for (std::size_t c = 0; c < kComponents; ++c)
+    out[c] = mixture.has[c] ? density(mixture.each[c], y) : kNever;
+  return out;
+}
+
+SharedAcceleration::Moments SharedAcceleration::moments(std::int32_t marker,
+                                                        const Mixture& mixture) const {
+  Moments out;
+  double total = 0, squares = 0;
+  const auto each = [&](auto&& use) {
+    for (std::size_t c = 0; c < kComponents; ++c)
+      for (int m = 0; mixture.has[c] && m < mixture.each[c].M; ++m)
+        use(mixture.each[c], m, std::exp(markers_[marker].log_weight[c] + mixture.each[c].log_w[m]));
+  };
+  each([&](const OwnMotion& one, int m, double w) {
+    total += w;
+    for (int d = 0; d < D_; ++d) out.at[d] += w * one.at[m][d];
+  });
+  for (int d = 0; d < D_; ++d) out.at[d] /= total;
+  each([&](const OwnMotion& one, int m, double w) {
+    squares += w * (one.P[m] + one.r + squared_distance(one.at[m], out.at, D_) / D_);
+  });
+  out.variance = squares / total;
+  return out;
 }
 
 double SharedAcceleration::gain(std::int32_t marker, const Densities& each) const {
@@ -135,7 +163,7 @@ SharedAcceleration::Field SharedAcceleration::field(std::span<const Arm> arms,
   return out;
 }
 
-double SharedAcceleration::own_density(const OwnMotion& own, const Point& y) const {
+double SharedAcceleration::density(const OwnMotion& own, const Point& y) const {
   std::array<double, kMaxModes> logs{};
   for (int m = 0; m < own.M; ++m) {
     const double S = own.P[m] + own.r + y.r;

@@ -39,7 +39,7 @@
 
 namespace asterism {
 
-// The prediction of a marker by its own motion: a Gaussian for each mode.
+// The prediction of a marker: a Gaussian for each mode of its own motion.
 struct OwnMotion {
   std::array<double, kMaxModes> log_w{}, P{};  // P: without the variance of the sensor
   std::array<Point, kMaxModes> at{};
@@ -48,6 +48,7 @@ struct OwnMotion {
   double r = 0;  // that of the sensor
   int M = 1;
 
+  OwnMotion() = default;
   OwnMotion(const Prediction& p, double noise)
       : center(p.center), S(p.variance()), r(noise), M(p.M) {
     for (int m = 0; m < M; ++m) {
@@ -96,6 +97,20 @@ class SharedAcceleration {
   struct Memory {
     RigidPredictions predictions;
   };
+  // The predictions of a detection by the components that there are.
+  struct Mixture {
+    std::array<OwnMotion, kComponents> each;
+    std::array<bool, kComponents> has{};
+
+    void set(std::size_t c, const OwnMotion& prediction) {
+      each[c] = prediction;
+      has[c] = true;
+    }
+  };
+  struct Moments {
+    Point at{};
+    double variance = 0;  // of a measured coordinate
+  };
 
   SharedAcceleration(int D, std::vector<Marker> markers) : D_(D), markers_(std::move(markers)) {
     for (std::size_t k = 0; k < markers_.size(); ++k)
@@ -110,13 +125,12 @@ class SharedAcceleration {
     return !markers_[marker].before.empty() || !markers_[marker].after.empty();
   }
 
-  // Writes the log density of a detection by each component; -inf for those without neighbours.
-  // `place_of(marker, frame)` is the detection of another marker, or null.
+  // Predicts a detection. `place_of(marker, frame)` is the detection of another marker, or null.
   template <typename PlaceOf>
-  void densities(const OwnMotion& own, const Link& link, PlaceOf&& place_of, Memory& memory,
-                 Densities& out) const {
-    out.fill(kNever);
-    out[0] = own_density(own, link.now);
+  void predict(const OwnMotion& own, const Link& link, PlaceOf&& place_of, Memory& memory,
+               Mixture& out) const {
+    out.has.fill(false);
+    out.set(0, own);
     Sight sight;
     for (const Neighbour& other : markers_[link.marker].before) {
       const Point* now = place_of(other.marker, link.to);
@@ -135,8 +149,11 @@ class SharedAcceleration {
     if (sight.n + sight.n_shape > 0) with_neighbours(own, link, sight, memory, out);
   }
 
+  // The log density of a detection by each component, -inf for one that there is not.
+  Densities densities(const Mixture& mixture, const Point& y) const;
   // The log density by the mixture, less that by own motion.
   double gain(std::int32_t marker, const Densities& each) const;
+  Moments moments(std::int32_t marker, const Mixture& mixture) const;
 
  private:
   static constexpr double kNever = -std::numeric_limits<double>::infinity();
@@ -167,9 +184,9 @@ class SharedAcceleration {
     return out;
   }
   void with_neighbours(const OwnMotion& own, const Link& link, const Sight& sight, Memory& memory,
-                       Densities& out) const;
+                       Mixture& out) const;
   Field field(std::span<const Arm> arms, double squared_length, double r) const;
-  double own_density(const OwnMotion& own, const Point& y) const;
+  double density(const OwnMotion& prediction, const Point& y) const;
   // The own prediction, with a place as a measurement of this variance.
   OwnMotion combined(const OwnMotion& own, const Point& place, double variance) const;
 

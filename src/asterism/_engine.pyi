@@ -484,7 +484,8 @@ class SharedAcceleration:
         log_weights: Floats,
     ) -> None: ...
 
-# Log densities (N, 10) of the detections of tracks, of which each is of a marker or -1.
+# (log densities (N, 10) of the detections of tracks, of which each is of a marker or -1; predicted
+# positions and variances (N, D + 1))
 def shared_densities(
     shared: SharedAcceleration,
     model: MotionModel,
@@ -496,7 +497,7 @@ def shared_densities(
     kind: Shorts,
     F: Floats,
     Q: Floats,
-) -> Floats: ...
+) -> tuple[Floats, Floats]: ...
 
 # Rotations (F, D, D) of a shape (n, D) that fit its points (F n, D).
 def turns(shape: Floats, points: Floats, weights: Floats) -> Floats: ...

@@ -89,10 +89,13 @@ def test_densities_are_those_of_the_reference(n_axes, model, extra):
     # Track 3 is of no marker, and track 4 of a marker that track 5 is of as well.
     markers = np.arange(13)
     markers[3], markers[4] = -1, 5
-    found = shared_densities(tracks, model, shared, markers)
-    expected = reference.densities(tracks.detections, model, shared, tracks.labels, markers)
+    found, predicted = shared_densities(tracks, model, shared, markers)
+    expected, moments = reference.densities(
+        tracks.detections, model, shared, tracks.labels, markers
+    )
     assert np.array_equal(np.isnan(found), np.isnan(expected))
     np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-7)
+    np.testing.assert_allclose(predicted, moments, rtol=1e-7, atol=1e-9)
     assert np.isfinite(found).sum(axis=0).min() >= 8  # every component is there somewhere
     gains = am.model.shared_gains(tracks, model, shared, markers)
     for i in range(len(gains)):
@@ -117,7 +120,7 @@ def test_the_density_of_a_detection_has_the_integral_1():
         moved = dataclasses.replace(
             tracks, detections=dataclasses.replace(tracks.detections, points=points)
         )
-        own = shared_densities(moved, model, shared)[-1, 0]
+        own = shared_densities(moved, model, shared)[0][-1, 0]
         total += np.exp(own + am.model.shared_gains(moved, model, shared)[-1]) * cell * 4
     assert total == pytest.approx(1, abs=0.03)
 

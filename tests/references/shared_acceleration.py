@@ -119,8 +119,9 @@ def carried(a, b, v, then, r: float):
 
 
 def densities(d, model, shared, labels, markers):
-    """Log densities (N, 10) of the detections of tracks, of which each is of a marker or -1."""
+    """Log densities (N, 10) of the detections of tracks, and moments of the mixture (N, D + 1)."""
     found = np.full((d.n_points, 10), np.nan)
+    moments = np.full((d.n_points, d.n_axes + 1), np.nan)
     kind, F, Q = steps_of(model.motion, d.times)
     r, D = model.sensor.noise_sigma**2, d.n_axes
     seen: dict[tuple[int, int], list[int]] = {}
@@ -144,18 +145,22 @@ def densities(d, model, shared, labels, markers):
             for step in range(s + 1, t + 1):
                 filter_.predict(F[kind[step]], Q[kind[step]])
             if marker >= 0:
-                found[i] = _of_detection(
-                    shared, marker, filter_.modes(), d.points[own[n - 1]], d.points[i],
-                    (s, t, n > 1), place, r, extra,
-                )  # fmt: skip
+                each = predictions(
+                    shared, marker, filter_.modes(), d.points[own[n - 1]], (s, t, n > 1), place, r
+                )
+                found[i] = [
+                    -np.inf if p is None else p.density(d.points[i], r + extra) for p in each
+                ]
+                moments[i] = moments_of(each, shared.weights[marker], r)
             filter_.update(d.points[i], extra)
-    return found
+    return found, moments
 
 
-def _of_detection(shared, marker, own, then, y, when, place, r, extra):
+def predictions(shared, marker, own, then, when, place, r):
+    """The prediction by each component, or None."""
     s, t, is_moving = when
-    out = np.full(10, -np.inf)
-    out[0] = own.density(y, r + extra)
+    out: list[Modes | None] = [None] * 10
+    out[0] = own
     pairs, shape, arms = [], [], []
     for b in range(shared.offsets[marker], shared.offsets[marker + 1]):
         j, v = int(shared.others[b]), shared.variances[b]
@@ -175,22 +180,28 @@ def _of_detection(shared, marker, own, then, y, when, place, r, extra):
         step, squares = field_at(x, a, float((length**2).mean()))
         for k, beta in enumerate(FIELD):
             variance = beta * own.variance(r)
-            out[1 + k] = own.with_place(own.center(), variance).density(y, r + extra)
-            variance += 6 * r * squares
-            out[3 + k] = own.with_place(own.center() + step, variance).density(y, r + extra)
+            out[1 + k] = own.with_place(own.center(), variance)
+            out[3 + k] = own.with_place(own.center() + step, variance + 6 * r * squares)
     rigid = None
-    if len(pairs) >= len(y):
+    if len(pairs) >= len(then):
         rigid = carried(*(np.array(each) for each in zip(*pairs, strict=True)), then, r)
         for k, factor in enumerate(RIGID):
-            out[5 + k] = own.with_place(rigid[0], factor * rigid[1]).density(y, r + extra)
-    if len(shape) >= len(y):
+            out[5 + k] = own.with_place(rigid[0], factor * rigid[1])
+    if len(shape) >= len(then):
         a, b, v = (np.array(each) for each in zip(*shape, strict=True))
-        formed = own.with_place(*carried(a, b, v, shared.own_shape[marker], r))
-        out[7] = formed.density(y, r + extra)
+        formed = out[7] = own.with_place(*carried(a, b, v, shared.own_shape[marker], r))
         for k, factor in enumerate(RIGID):
             if rigid is not None:
-                out[8 + k] = formed.with_place(rigid[0], factor * rigid[1]).density(y, r + extra)
+                out[8 + k] = formed.with_place(rigid[0], factor * rigid[1])
     return out
+
+
+def moments_of(each, weights, r):
+    """Mean of a mixture, and its variance along an axis with the noise of the sensor."""
+    w = np.concatenate([w * np.exp(p.log_w) for p, w in zip(each, weights, strict=True) if p])
+    at, P = (np.concatenate([getattr(p, name) for p in each if p]) for name in ("at", "P"))
+    mean = w @ at / w.sum()
+    return np.append(mean, w @ (P + r + ((at - mean) ** 2).mean(axis=1)) / w.sum())
 
 
 def gains(each, weights):

@@ -244,12 +244,12 @@ class SharedTerm {
     const auto &from = window[i], &to = window[j];
     const auto gap = static_cast<int>(to.frame - from.frame);
     p.filter().expect(p.motion(), window, state, from.frame, gap, expected_);
-    shared_->densities(
+    shared_->predict(
         Filter::own_motion(p.motion(), expected_),
         {marker, from.frame, to.frame, from.y, to.y, n_before > 1},
         [&](std::int32_t other, std::int64_t frame) { return place(other, frame); }, memory_,
-        densities_);
-    return shared_->gain(marker, densities_);
+        mixture_);
+    return shared_->gain(marker, shared_->densities(mixture_, to.y));
   }
 
   const Partition<Filter>*whole_ = nullptr, *part_ = nullptr;
@@ -264,7 +264,7 @@ class SharedTerm {
   // Terms in the present state, by detection of the part and of the whole partition.
   std::vector<double> known_inside_, known_outside_;
   typename Filter::Expected expected_{};
-  SharedAcceleration::Densities densities_{};
+  SharedAcceleration::Mixture mixture_;
   SharedAcceleration::Memory memory_;
 };
 

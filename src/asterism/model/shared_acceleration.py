@@ -106,8 +106,8 @@ def shared_densities(
     model: TrackingModel,
     shared: SharedAcceleration,
     markers: NDArray[np.int64] | None = None,
-) -> NDArray[np.float64]:
-    """Compute the log density of each detection by each component.
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Compute the log density of each detection by each component, and the predictions.
 
     Parameters
     ----------
@@ -116,9 +116,11 @@ def shared_densities(
 
     Returns
     -------
-    ndarray of shape (N, C)
+    densities : ndarray of shape (N, C)
         -inf for a component without neighbours; NaN for clutter, the first detection of a track,
         and a track that is of no marker.
+    predicted : ndarray of shape (N, D + 1)
+        Mean of the mixture, metres, and variance of a measured coordinate, m²; NaN as above.
     """
     d = tracks.detections
     order, offsets = tracks.by_track
@@ -126,11 +128,12 @@ def shared_densities(
     points = with_noise(d.points, d.covariances)
     of = np.arange(tracks.n_tracks) if markers is None else markers
     found = np.full((d.n_points, len(COMPONENTS)), np.nan)
-    found[order] = _engine.shared_densities(
+    predicted = np.full((d.n_points, d.n_axes + 1), np.nan)
+    found[order], predicted[order] = _engine.shared_densities(
         shared.compiled, motion_model(model, d.n_axes), of.astype(np.int32), points[order],
         d.frame_of[order], offsets, d.times, kind, F, Q,
     )  # fmt: skip
-    return found
+    return found, predicted
 
 
 def shared_gains(
@@ -181,7 +184,7 @@ def shared_gains(
         of = check_array("markers", markers, ("K",), dtype=np.int64)
     if len(of) != tracks.n_tracks or (len(of) and not -1 <= of.min() <= of.max() < K):
         raise ParameterError("markers", f"one of {K} markers for each track, or -1", markers)
-    densities = shared_densities(tracks, model, shared, of)
+    densities, _ = shared_densities(tracks, model, shared, of)
     gains = np.zeros(len(densities))
     has = np.flatnonzero(np.isfinite(densities[:, 0]))
     log_weights = _log_weights(densities[has], shared.weights[of[tracks.labels[has]]])

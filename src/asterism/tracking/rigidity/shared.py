@@ -84,7 +84,7 @@ def learn_shared_acceleration(tracks: Tracks, model: TrackingModel) -> SharedAcc
         shape=np.concatenate(shape), own_shape=own_shape,
         weights=np.ones((K, len(COMPONENTS))) / len(COMPONENTS),
     )  # fmt: skip
-    densities = shared_densities(tracks, model, shared)
+    densities, _ = shared_densities(tracks, model, shared)
     weights = _fitted_weights(densities, tracks.labels, K)
     return SharedAcceleration(
         offsets=shared.offsets, others=shared.others, distances=shared.distances,
