@@ -134,7 +134,7 @@ def test_markers_of_a_segment_are_learnt_to_move_together_and_others_not():
     shared = am.tracking.learn_shared_acceleration(tracks, model)
     assert (np.diff(shared.offsets)[1:8] == np.arange(1, 8)).all()
     assert (np.diff(shared.offsets)[8:] == 0).all()
-    assert (shared.weights[4:8, :3].sum(axis=1) < 0.05).all()
+    assert (shared.weights[4:8, :3].sum(axis=1) < 0.08).all()
     np.testing.assert_allclose(shared.weights.sum(axis=1), 1)
     gains = am.model.shared_gains(tracks, model, shared)
     assert not gains[tracks.labels >= 8].any()
@@ -147,12 +147,14 @@ def test_weights_are_those_from_which_detections_were_drawn():
     rng = np.random.default_rng(5)
     densities = rng.normal(0, 3, (20_000, len(COMPONENTS)))
     # Draw the component of each detection, and reject: p(c | densities) ∝ w_c exp(density).
-    from asterism.tracking.rigidity.shared import _fitted_weights
+    from asterism.tracking.rigidity.shared import ALONE, _fitted_weights
 
     weights = WEIGHTS / WEIGHTS.sum()
     mixture = np.exp(densities) @ weights / np.exp(densities).mean(axis=1)
     kept = rng.random(len(densities)) < mixture / mixture.max()
     found = _fitted_weights(densities[kept], np.zeros(int(kept.sum()), dtype=np.int64), 1)[0]
+    found[0] -= ALONE
+    found /= 1 - ALONE
     share = np.exp(densities[kept]) * weights
     share /= share.sum(axis=1, keepdims=True)
     information = (share / weights).T @ (share / weights)

@@ -71,7 +71,7 @@ class SharedAcceleration:
     >>> model = am.estimate_model(truth.detections).model
     >>> shared = am.tracking.learn_shared_acceleration(truth, model)
     >>> shared
-    SharedAcceleration(53 markers, 704 bonds, weight of own motion 0.06)
+    SharedAcceleration(53 markers, 704 bonds, weight of own motion 0.09)
     """
 
     offsets: NDArray[np.int64]

@@ -29,6 +29,8 @@ MISSING = 4.0
 largest that counts."""
 PRIOR = 20.0
 """Detections for which the weights of all markers count in those of each marker."""
+ALONE = 0.03
+"""Least weight of a marker's own motion: neighbours may move otherwise than where it was learnt."""
 ROUNDS = 30
 """Number of iterations of the weights."""
 
@@ -38,7 +40,8 @@ def learn_shared_acceleration(tracks: Tracks, model: TrackingModel) -> SharedAcc
 
     Bonds are those of all distances, and a marker comes after those of smaller number. Its shape is
     the positions in the frame whose distances are most usual. The weights of the predictions
-    maximise the density of the detections (EM); those of each marker are drawn to those of all.
+    maximise the density of the detections (EM); those of each marker are drawn to those of all, and
+    that of own motion is at least `ALONE`.
 
     Parameters
     ----------
@@ -141,4 +144,4 @@ def _fitted_weights(
             [np.bincount(labels, each, minlength=n_markers) for each in share.T], axis=1
         )
         weights = (sums + PRIOR * common) / (sums.sum(axis=1, keepdims=True) + PRIOR)
-    return weights
+    return (1 - ALONE) * weights + ALONE * alone
