@@ -246,16 +246,50 @@ def test_the_chain_samples_two_segments_as_enumerated(seed):
     assert problem.total_variation(300_000, with_shared=False) > 0.3
 
 
-@pytest.mark.parametrize("seed", [2, 4, 6])
-def test_the_chain_samples_two_open_frames_as_enumerated(seed):
-    """A change in one frame changes the terms of later ones, and tracks may begin."""
+@pytest.mark.parametrize(
+    ("seed", "n", "n_open"),
+    [(2, 3, 2), (4, 3, 2), (6, 3, 2), (7, 2, 3), (9, 2, 3), (12, 2, 3)],
+)
+def test_the_chain_samples_several_open_frames_as_enumerated(seed, n, n_open):
+    """A change in a frame changes the terms of the next two frames, and tracks may begin."""
     rng, places, shapes = two_segments(seed)
-    tracks = tracks_of(rng, places[:, :3], missing=0)
+    tracks = tracks_of(rng, places[:, :n], missing=0)
     model = small_model(motion=FAST, max_speed=8.0)
-    problem = Enumerated(tracks, model, made_by_hand(shapes[:1]), 2)
+    problem = Enumerated(tracks, model, made_by_hand([shapes[0][:n]]), n_open)
     assert len(problem.p) > 300
     assert problem.total_variation(300_000) < 0.01
-    assert problem.total_variation(300_000, with_shared=False) > 0.3
+    assert problem.total_variation(300_000, with_shared=False) > 0.2
+
+
+@pytest.mark.parametrize("motion", [FAST, interacting()], ids=["one motion", "several"])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_gain_of_each_move_is_the_difference_of_the_posteriors(seed, motion):
+    """Over several open frames, with gaps, and tracks of the same marker or of none."""
+    rng = np.random.default_rng(seed)
+    places, shapes = segments(rng, (5, 3), 8, n_axes=2 + seed % 2, jump=0.04, own=0.004)
+    places[:, 5:] += places[-1, :1] - places[-1, 5:6] + 0.05
+    tracks = tracks_of(rng, places, missing=0.2)
+    model, shared = small_model(motion=motion, max_speed=8.0), made_by_hand(shapes)
+    d, given = tracks.detections, tracks.labels.copy()
+    given[rng.random(len(given)) < 0.1] = -1
+    chain = make_chain(d, model, informed=True, seed=seed)
+    chain.assign(np.where(d.frame_of < 3, tracks.labels, -1))
+    chain.give(given, shared.compiled)
+    chain.freeze(1)
+    chain.run(500)
+
+    def posterior(labels):
+        number = {v: k for k, v in enumerate(np.unique(labels[labels >= 0]).tolist())}
+        dense = np.array([number.get(v, -1) for v in labels.tolist()])
+        found = am.Tracks(detections=d, labels=dense)
+        firsts = np.array([np.flatnonzero(dense == k)[0] for k in range(found.n_tracks)], int)
+        gains = am.model.shared_gains(found, model, shared, given[firsts])
+        return am.log_posterior(found, model) + gains.sum()
+
+    moves = chain.trace(300)
+    assert len(moves) > 100
+    for _, _, before, after, _, _, gain, *_ in moves:
+        assert gain == pytest.approx(posterior(after) - posterior(before), rel=1e-7, abs=1e-6)
 
 
 def test_mcmcda_keeps_fast_segments_apart_by_their_acceleration():
