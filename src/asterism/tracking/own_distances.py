@@ -76,17 +76,22 @@ def assigned_again(found: Uncorrected) -> Uncorrected:
     found : Uncorrected
         Tracks without names, `refined_by_own_distances`.
     """
-    best = found
+    best, is_stitched_again = found, False
     for n in range(MAX_ROUNDS):
         begun = best if n == 0 else _stitched_again(best)
         again = _with_lost_markers(_with_lone_detections(_reassigned(begun)))
         again = exchanged_by_spreads(again)
         if n > 0 and again.expected_right <= best.expected_right:
             break
-        best = again
+        best, is_stitched_again = again, n > 0
         if not best.is_doubtful or not best.has_bonds:
             break
-    return best
+    if best.stitching is None or not is_stitched_again:
+        return best
+    # What moved since the first stitching is a join, also where it was stitched again.
+    n_refined = int(best.tracks.info.get("refinements", 0))
+    whole = dataclasses.replace(best, stitching=found.stitching)
+    return _with_labels(whole, best.tracks.labels, n_refined)
 
 
 def _stitched_again(found: Uncorrected) -> Uncorrected:
