@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -52,3 +53,21 @@ def test_tracks_are_cut_at_gaps_that_the_model_excludes_and_keep_their_labels():
         assert np.diff(own).max(initial=0) <= found.model.population.max_gap
     no_stitching = dataclasses.replace(found, stitching=None)
     assert own_distances._stitched_again(no_stitching) is no_stitching
+
+
+def test_rounds_after_the_first_begin_with_tracks_that_were_stitched_again(monkeypatch):
+    begun = []
+
+    def stitched_again(found):
+        begun.append(found.expected_right)
+        return SimpleNamespace(**vars(found) | {"expected_right": min(found.expected_right + 1, 2)})
+
+    for step in ("_reassigned", "_with_lone_detections", "_with_lost_markers"):
+        monkeypatch.setattr(own_distances, step, lambda found: found)
+    monkeypatch.setattr(own_distances, "exchanged_by_spreads", lambda found: found)
+    monkeypatch.setattr(own_distances, "_stitched_again", stitched_again)
+    first = SimpleNamespace(expected_right=0, is_doubtful=True, has_bonds=True, stitching=None)
+    assert own_distances.assigned_again(first).expected_right == 2
+    assert begun == [0, 1, 2]  # the last round made no more identities certain
+    first.has_bonds = False
+    assert own_distances.assigned_again(first) is first
