@@ -124,7 +124,7 @@ nb::tuple shared_densities(const SharedAcceleration& shared, const MotionModel& 
       for (std::size_t i = 1; i < own.size(); ++i) {
         for (std::int64_t t = at[i - 1] + 1; t <= at[i]; ++t) predict(m, line.step(t), state);
         const Prediction prediction(m, state);
-        shared.predict(OwnMotion(prediction, m.axis.r),
+        shared.predict(PredictionByMode(prediction, m.axis.r),
                        {marker, at[i - 1], at[i], own[i - 1], own[i], i > 1}, places, memory, mixture);
         update(m, prediction, own[i], state);
         const std::size_t row = static_cast<std::size_t>(tracks.offsets[k]) + i;

@@ -43,8 +43,8 @@ double normalise(std::span<double> logs) {
 
 }  // namespace
 
-void SharedAcceleration::with_neighbours(const OwnMotion& own, const Link& link, const Sight& sight,
-                                         Memory& memory, Mixture& out) const {
+void SharedAcceleration::with_neighbours(const PredictionByMode& own, const Link& link,
+                                         const Sight& sight, Memory& memory, Mixture& out) const {
   const std::size_t n_min = min_for_rotation(D_);
   if (sight.n_arms > 0) {
     const double n = static_cast<double>(sight.n_arms);
@@ -79,14 +79,14 @@ void SharedAcceleration::with_neighbours(const OwnMotion& own, const Link& link,
       [&](const Motion& one, const RigidPrediction& prediction) {
         *one.found = prediction.place(own.r, 1);
       });
-  const auto add_rigid = [&](const OwnMotion& before, std::size_t first) {
+  const auto add_rigid = [&](const PredictionByMode& before, std::size_t first) {
     if (sight.n < n_min) return;
     for (std::size_t k = 0; k < kRigid.size(); ++k)
       out.set(first + k, combined(before, rigid.at, kRigid[k] * rigid.variance));
   };
   add_rigid(own, kTurn);
   if (!has_shape) return;
-  const OwnMotion shaped = combined(own, shape.at, shape.variance);
+  const PredictionByMode shaped = combined(own, shape.at, shape.variance);
   out.set(kShape, shaped);
   add_rigid(shaped, kShape + 1);
 }
@@ -108,12 +108,12 @@ SharedAcceleration::Moments SharedAcceleration::moments(std::int32_t marker,
       for (int m = 0; mixture.has[c] && m < mixture.each[c].M; ++m)
         use(mixture.each[c], m, std::exp(markers_[marker].log_weight[c] + mixture.each[c].log_w[m]));
   };
-  each([&](const OwnMotion& one, int m, double w) {
+  each([&](const PredictionByMode& one, int m, double w) {
     total += w;
     for (int d = 0; d < D_; ++d) out.at[d] += w * one.at[m][d];
   });
   for (int d = 0; d < D_; ++d) out.at[d] /= total;
-  each([&](const OwnMotion& one, int m, double w) {
+  each([&](const PredictionByMode& one, int m, double w) {
     squares += w * (one.P[m] + one.r + squared_distance(one.at[m], out.at, D_) / D_);
   });
   out.variance = squares / total;
@@ -163,7 +163,7 @@ SharedAcceleration::Field SharedAcceleration::field(std::span<const Arm> arms,
   return out;
 }
 
-double SharedAcceleration::density(const OwnMotion& own, const Point& y) const {
+double SharedAcceleration::density(const PredictionByMode& own, const Point& y) const {
   std::array<double, kMaxModes> logs{};
   for (int m = 0; m < own.M; ++m) {
     const double S = own.P[m] + own.r + y.r;
@@ -173,9 +173,9 @@ double SharedAcceleration::density(const OwnMotion& own, const Point& y) const {
   return normalise(std::span(logs).first(static_cast<std::size_t>(own.M))) - 0.5 * D_ * log_2pi;
 }
 
-OwnMotion SharedAcceleration::combined(const OwnMotion& own, const Point& place,
-                                       double variance) const {
-  OwnMotion out = own;
+PredictionByMode SharedAcceleration::combined(const PredictionByMode& own, const Point& place,
+                                              double variance) const {
+  PredictionByMode out = own;
   for (int m = 0; m < own.M; ++m) {
     const double spread = own.P[m] + variance, share = own.P[m] / spread;
     const double off2 = squared_distance(place, own.at[m], D_);

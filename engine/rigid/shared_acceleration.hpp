@@ -39,8 +39,9 @@
 
 namespace asterism {
 
-// The prediction of a marker: a Gaussian for each mode of its own motion.
-struct OwnMotion {
+// A prediction of a marker: a Gaussian for each mode of its own motion, alone or combined with a
+// place to which neighbours lead.
+struct PredictionByMode {
   std::array<double, kMaxModes> log_w{}, P{};  // P: without the variance of the sensor
   std::array<Point, kMaxModes> at{};
   Point center{};
@@ -48,8 +49,8 @@ struct OwnMotion {
   double r = 0;  // that of the sensor
   int M = 1;
 
-  OwnMotion() = default;
-  OwnMotion(const Prediction& p, double noise)
+  PredictionByMode() = default;
+  PredictionByMode(const Prediction& p, double noise)
       : center(p.center), S(p.variance()), r(noise), M(p.M) {
     for (int m = 0; m < M; ++m) {
       log_w[m] = std::log(p.w[m]);
@@ -57,7 +58,7 @@ struct OwnMotion {
       at[m] = p.y[m];
     }
   }
-  OwnMotion(const Point& only, double variance, double noise)
+  PredictionByMode(const Point& only, double variance, double noise)
       : center(only), S(variance), r(noise) {
     P[0] = S - r;
     at[0] = only;
@@ -99,10 +100,10 @@ class SharedAcceleration {
   };
   // The predictions of a detection by the components that there are.
   struct Mixture {
-    std::array<OwnMotion, kComponents> each;
+    std::array<PredictionByMode, kComponents> each;
     std::array<bool, kComponents> has{};
 
-    void set(std::size_t c, const OwnMotion& prediction) {
+    void set(std::size_t c, const PredictionByMode& prediction) {
       each[c] = prediction;
       has[c] = true;
     }
@@ -127,7 +128,7 @@ class SharedAcceleration {
 
   // Predicts a detection. `place_of(marker, frame)` is the detection of another marker, or null.
   template <typename PlaceOf>
-  void predict(const OwnMotion& own, const Link& link, PlaceOf&& place_of, Memory& memory,
+  void predict(const PredictionByMode& own, const Link& link, PlaceOf&& place_of, Memory& memory,
                Mixture& out) const {
     out.has.fill(false);
     out.set(0, own);
@@ -183,12 +184,12 @@ class SharedAcceleration {
     }
     return out;
   }
-  void with_neighbours(const OwnMotion& own, const Link& link, const Sight& sight, Memory& memory,
-                       Mixture& out) const;
+  void with_neighbours(const PredictionByMode& own, const Link& link, const Sight& sight,
+                       Memory& memory, Mixture& out) const;
   Field field(std::span<const Arm> arms, double squared_length, double r) const;
-  double density(const OwnMotion& prediction, const Point& y) const;
+  double density(const PredictionByMode& prediction, const Point& y) const;
   // The own prediction, with a place as a measurement of this variance.
-  OwnMotion combined(const OwnMotion& own, const Point& place, double variance) const;
+  PredictionByMode combined(const PredictionByMode& own, const Point& place, double variance) const;
 
   int D_;
   std::vector<Marker> markers_;

@@ -18,6 +18,7 @@
 #include "mcmc/chain/chain_runner.hpp"
 #include "mcmc/chain/chain_stats.hpp"
 #include "mcmc/chain/split.hpp"
+#include "mcmc/model/edits_to_part.hpp"
 
 namespace asterism {
 
@@ -50,7 +51,7 @@ class ParallelChains {
       const std::size_t g = task / n_chains_;
       Found& own = found[task];
       own.gain = runner.search(whole, groups[g], seed_of(seed, task), budgets.of(g), own.stats);
-      if (own.gain > 0) own.edits = whole.edits_to(runner.partition(), groups[g].tracks);
+      if (own.gain > 0) own.edits = edits_to_part(whole, runner.partition(), groups[g].tracks);
     });
     for (std::size_t g = 0; g < groups.size(); ++g) {
       const auto first = found.begin() + static_cast<std::ptrdiff_t>(g) * n_chains_;

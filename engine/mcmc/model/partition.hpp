@@ -15,7 +15,6 @@
 #include <cstdint>
 #include <memory>
 #include <span>
-#include <unordered_map>
 #include <vector>
 
 #include "math/index_set.hpp"
@@ -218,41 +217,6 @@ class Partition {
   }
   // Number of a detection in the whole partition; the number itself if this is not a part.
   std::int32_t origin(std::int32_t i) const { return origin_.empty() ? i : origin_[i]; }
-
-  // The edits that replace these tracks by the result of a part that was taken of them.
-  std::vector<Edit<Filter>> edits_to(const Partition& part,
-                                     std::span<const std::int32_t> tracks) const {
-    std::unordered_map<std::int32_t, std::int32_t> by_first;
-    for (const std::int32_t k : tracks)
-      by_first[tracks_[k].nodes[tracks_[k].first_open()]] = k;
-    std::vector<Edit<Filter>> edits;
-    for (const std::int32_t p : part.all_.items()) {
-      const auto& nodes = part.tracks_[p].nodes;
-      Edit<Filter> edit;
-      std::size_t same = 0;
-      if (const auto at = by_first.find(part.origin_[nodes.front()]); at != by_first.end()) {
-        edit.track = at->second;
-        const Track& own = tracks_[edit.track];
-        edit.keep = own.first_open();
-        while (same < nodes.size() && edit.keep < own.size() &&
-               own.nodes[edit.keep] == part.origin_[nodes[same]]) {
-          ++same;
-          ++edit.keep;
-        }
-        by_first.erase(at);
-        if (same == nodes.size() && edit.keep == own.size()) continue;
-      }
-      for (; same < nodes.size(); ++same) {
-        edit.tail.nodes.push_back(part.origin_[nodes[same]]);
-        filter_.adopt(edit.tail.states.emplace_back(part.state_[nodes[same]]));
-        edit.tail.scores.push_back(part.score_[nodes[same]]);
-      }
-      edits.push_back(std::move(edit));
-    }
-    for (const std::int32_t k : tracks)
-      if (by_first.contains(tracks_[k].nodes[tracks_[k].first_open()])) edits.emplace_back().track = k;
-    return edits;
-  }
 
   // Ends a block of a longer capture at this frame. `n_after` frames of the capture follow the last
   // frame of the window.

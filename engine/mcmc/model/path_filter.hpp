@@ -6,7 +6,7 @@
 //   expect      prediction from a state after a gap
 //   center, radius, log_likelihood   of a prediction: its position, the radius within which the log
 //               likelihood exceeds a value, and the log likelihood of a point
-//   own_motion  the same as Gaussians
+//   own_prediction  the same as Gaussians
 //   weigh       the log likelihood of the point with which `take` will update
 //   take        state after the update with this point
 #pragma once
@@ -90,7 +90,9 @@ class OneMotion {
   }
 
   static const Point& center(const Expected& e) { return e.center; }
-  static OwnMotion own_motion(const MotionModel& m, const Expected& e) { return {e.center, e.S, m.axis.r}; }
+  static PredictionByMode own_prediction(const MotionModel& m, const Expected& e) {
+    return {e.center, e.S, m.axis.r};
+  }
   static double radius(const Expected& e, double log_likelihood, double max_r) {
     const double half = e.log_peak - log_likelihood;
     return half < 0 ? -1 : std::sqrt(2 * (e.S + max_r) * half);
@@ -165,7 +167,9 @@ class SeveralMotions {
     out.prediction = Prediction(m, out.state);
   }
   static const Point& center(const Expected& e) { return e.prediction.center; }
-  static OwnMotion own_motion(const MotionModel& m, const Expected& e) { return {e.prediction, m.axis.r}; }
+  static PredictionByMode own_prediction(const MotionModel& m, const Expected& e) {
+    return {e.prediction, m.axis.r};
+  }
   static double radius(const Expected& e, double log_likelihood, double max_r) {
     return e.prediction.radius(std::numeric_limits<double>::infinity(), log_likelihood, max_r);
   }

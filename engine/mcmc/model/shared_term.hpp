@@ -245,7 +245,7 @@ class SharedTerm {
     const auto gap = static_cast<int>(to.frame - from.frame);
     p.filter().expect(p.motion(), window, state, from.frame, gap, expected_);
     shared_->predict(
-        Filter::own_motion(p.motion(), expected_),
+        Filter::own_prediction(p.motion(), expected_),
         {marker, from.frame, to.frame, from.y, to.y, n_before > 1},
         [&](std::int32_t other, std::int64_t frame) { return place(other, frame); }, memory_,
         mixture_);

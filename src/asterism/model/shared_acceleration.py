@@ -37,7 +37,19 @@ COMPONENTS = (
     "own", "still 0.1", "still 0.5", "field 0.1", "field 0.5", "rigid 0.25", "rigid 1", "shape",
     "shape, rigid 0.25", "shape, rigid 1",
 )  # fmt: skip
-"""Predictions of a detection, with the factors of their variances."""
+"""Predictions of a detection, with the factors of their variances.
+
+own
+    By the marker's own motion.
+still
+    By it, and by no acceleration.
+field
+    By it, and by the acceleration of its neighbours: an affine field.
+rigid
+    By it, and by the rigid motion of its neighbours since the detection before.
+shape
+    By it, and by the place of the marker in the shape of its neighbours.
+"""
 N_OWN = 3
 """Number of the first components, which do not depend on neighbours."""
 
@@ -121,12 +133,19 @@ def shared_densities(
         and a track that is of no marker.
     predicted : ndarray of shape (N, D + 1)
         Mean of the mixture, metres, and variance of a measured coordinate, m²; NaN as above.
+
+    Raises
+    ------
+    ParameterError
+        As for `shared_gains`.
     """
-    d = tracks.detections
+    check_kind("tracks", tracks, Tracks, "am.track(detections)")
+    check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
+    check_kind("shared", shared, SharedAcceleration, "am.tracking.learn_shared_acceleration(…)")
+    d, of = tracks.detections, _marker_of(tracks, shared, markers)
     order, offsets = tracks.by_track
     kind, F, Q = steps_of(model.motion, d.times)
     points = with_noise(d.points, d.covariances)
-    of = np.arange(tracks.n_tracks) if markers is None else markers
     found = np.full((d.n_points, len(COMPONENTS)), np.nan)
     predicted = np.full((d.n_points, d.n_axes + 1), np.nan)
     found[order], predicted[order] = _engine.shared_densities(
@@ -175,21 +194,25 @@ def shared_gains(
     >>> bool(am.model.shared_gains(truth, model, shared).sum() > 1000)
     True
     """
-    check_kind("tracks", tracks, Tracks, "am.track(detections)")
-    check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
-    check_kind("shared", shared, SharedAcceleration, "am.tracking.learn_shared_acceleration(…)")
-    K = len(shared.weights)
-    of = np.arange(tracks.n_tracks)
-    if markers is not None:
-        of = check_array("markers", markers, ("K",), dtype=np.int64)
-    if len(of) != tracks.n_tracks or (len(of) and not -1 <= of.min() <= of.max() < K):
-        raise ParameterError("markers", f"one of {K} markers for each track, or -1", markers)
-    densities, _ = shared_densities(tracks, model, shared, of)
+    densities, _ = shared_densities(tracks, model, shared, markers)
+    of = _marker_of(tracks, shared, markers)
     gains = np.zeros(len(densities))
     has = np.flatnonzero(np.isfinite(densities[:, 0]))
     log_weights = _log_weights(densities[has], shared.weights[of[tracks.labels[has]]])
     gains[has] = _log_sum(log_weights + densities[has]) - densities[has, 0]
     return gains
+
+
+def _marker_of(
+    tracks: Tracks, shared: SharedAcceleration, markers: NDArray[np.int64] | None
+) -> NDArray[np.int64]:
+    """Return the marker of each track, -1 for none."""
+    K, of = len(shared.weights), np.arange(tracks.n_tracks)
+    if markers is not None:
+        of = check_array("markers", markers, ("K",), dtype=np.int64)
+    if len(of) != tracks.n_tracks or (len(of) and not -1 <= of.min() <= of.max() < K):
+        raise ParameterError("markers", f"one of {K} markers for each track, or -1", markers)
+    return of
 
 
 def _log_weights(

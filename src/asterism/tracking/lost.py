@@ -8,6 +8,7 @@ import numpy as np
 
 from asterism import _engine
 from asterism.tracking.rigidity.distances import distances_between
+from asterism.tracking.rigidity.sampled import sampled_positions
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -16,8 +17,6 @@ if TYPE_CHECKING:
 
 __all__ = ["with_lost_markers"]
 
-SAMPLES = 500
-"""Number of frames from which the distances are learnt."""
 STEADY = 0.05
 """Largest standard deviation of a distance that is compared, metres."""
 
@@ -51,24 +50,12 @@ def with_lost_markers(
     odds are those of these distances against any distance, and must be 6, and 3 more than those of
     all other detections of the track, and of all other tracks.
     """
-    d, n = detections, min(SAMPLES, detections.n_frames)
-    sampled = np.arange(n) * d.n_frames // max(n, 1)
-    distances = distances_between(_positions(d, labels, sampled))
+    d = detections
+    n_tracks = int(labels.max(initial=-1)) + 1
+    distances = distances_between(sampled_positions(d, labels, n_tracks))
     spread = np.sqrt(distances.predictive_variance + 2 * noise_sigma**2)
     spread[~distances.is_bond | (spread > STEADY)] = np.inf
     return _engine.find_lost(
         np.ascontiguousarray(d.points), labels, d.offsets.astype(np.int64),
         np.nan_to_num(distances.middle), spread,
     )  # fmt: skip
-
-
-def _positions(
-    d: Detections, labels: NDArray[np.int64], frames: NDArray[np.int64]
-) -> NDArray[np.float64]:
-    """Return the positions in some frames, shape (F, K, D), NaN without a detection."""
-    number = np.full(d.n_frames, -1)
-    number[frames] = np.arange(len(frames))
-    used = np.flatnonzero((labels >= 0) & (number[d.frame_of] >= 0))
-    found = np.full((len(frames), int(labels.max(initial=-1)) + 1, d.n_axes), np.nan)
-    found[number[d.frame_of[used]], labels[used]] = d.points[used]
-    return found

@@ -8,6 +8,7 @@ import numpy as np
 
 from asterism import _engine
 from asterism.records import record
+from asterism.tracking.rigidity.sampled import sampled_frames
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -60,7 +61,7 @@ def learn_profiles(
         Frames with parts of tracks that will be compared with the profiles.
     """
     d = detections
-    samples = _samples(d)
+    samples = sampled_frames(d.n_frames, SAMPLES)
     frames = samples if also is None else np.union1d(samples, also)
     rows, offsets = _rows(d, frames)
     engine = _engine.DistanceProfiles(
@@ -97,7 +98,7 @@ def candidate_margins(
         first is below `UNLIKE`. Both are 0 for a track that keeps no distances.
     """
     d = detections
-    samples = _samples(d)
+    samples = sampled_frames(d.n_frames, SAMPLES)
     # Each candidate has a copy of its frame.
     frame = d.frame_of[candidates]
     rows, offsets = _rows(d, np.concatenate([samples, frame]))
@@ -124,11 +125,6 @@ def candidate_margins(
     densities[is_there[:, others] | (densities == 0)] = -np.inf
     found[alike, 1] = -densities.max(axis=1, initial=-np.inf)
     return found
-
-
-def _samples(d: Detections) -> NDArray[np.int64]:
-    n = min(SAMPLES, d.n_frames)
-    return np.arange(n) * d.n_frames // max(n, 1)
 
 
 def _rows(d: Detections, frames: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

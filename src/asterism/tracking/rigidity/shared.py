@@ -14,14 +14,13 @@ from asterism.model.shared_acceleration import (
     shared_densities,
 )
 from asterism.tracking.rigidity.distances import Distances, distances_between
+from asterism.tracking.rigidity.sampled import sampled_positions
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 __all__ = ["learn_shared_acceleration"]
 
-MAX_FRAMES = 500
-"""Number of evenly spread frames in which distances are measured."""
 MAX_BONDS, MAX_COMPARED = 16, 8
 """Number of steadiest bonds of a marker, and of those by which the frame of its shape is chosen."""
 MISSING = 4.0
@@ -65,7 +64,7 @@ def learn_shared_acceleration(tracks: Tracks, model: TrackingModel) -> SharedAcc
     check_kind("tracks", tracks, Tracks, "am.track(detections)")
     check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
     K, D = tracks.n_tracks, tracks.detections.n_axes
-    positions = _sampled(tracks)
+    positions = sampled_positions(tracks.detections, tracks.labels, K)
     distances = distances_between(positions)
     variance = distances.predictive_variance
     offsets, all_others = [0], [np.empty(0, dtype=np.int64)]
@@ -93,18 +92,6 @@ def learn_shared_acceleration(tracks: Tracks, model: TrackingModel) -> SharedAcc
         offsets=shared.offsets, others=shared.others, distances=shared.distances,
         variances=shared.variances, shape=shared.shape, own_shape=own_shape, weights=weights,
     )  # fmt: skip
-
-
-def _sampled(tracks: Tracks) -> NDArray[np.float64]:
-    """Return the positions in up to `MAX_FRAMES` frames, (F, K, D), NaN without a detection."""
-    d = tracks.detections
-    n = min(MAX_FRAMES, d.n_frames)
-    number = np.full(d.n_frames, -1)
-    number[np.arange(n) * d.n_frames // max(n, 1)] = np.arange(n)
-    used = np.flatnonzero((tracks.labels >= 0) & (number[d.frame_of] >= 0))
-    found = np.full((n, tracks.n_tracks, d.n_axes), np.nan)
-    found[number[d.frame_of[used]], tracks.labels[used]] = d.points[used]
-    return found
 
 
 def _usual_frame(
