@@ -7,6 +7,8 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 import asterism as am
 from asterism.reporting.names_found import naming_figures, naming_rows
 from asterism.reporting.places import places_of
@@ -47,6 +49,9 @@ class Summary:
         Expected number of detections with a wrong identity at these places.
     info : dict
         Figures of the method, such as the error of approximations.
+    shared : dict or None
+        Size of the acceleration that the markers of rigid segments have in common, m/s², its
+        standard error, and the number of these markers; None where the method has no bonds.
     naming : dict or None
         Names and their probabilities as plain values; None without marker sets.
     filled : dict or None
@@ -73,6 +78,7 @@ class Summary:
     places: int
     expected_wrong: float
     info: dict[str, float]
+    shared: dict[str, float] | None = None
     naming: dict[str, Any] | None = None
     filled: dict[str, int] | None = None
     truncated: str = ""
@@ -92,6 +98,7 @@ class Summary:
             ("gaps", str(self.n_gaps)),
             *((("longest gaps"), gap) if i == 0 else ("", gap) for i, gap in enumerate(gaps)),
             *stitching_rows(self.info),
+            *self._shared(),
             *self.named,
             *self._filled(),
             *self._certainty(),
@@ -100,6 +107,12 @@ class Summary:
             ("time", f"{self.seconds:.3g} s, {self.frames_per_second:,.0f} frames/s"),
             ("written", self.output),
         ]
+
+    def _shared(self) -> list[tuple[str, str]]:
+        if self.shared is None:
+            return []
+        size = f"{self.shared['size']:.3g} ± {self.shared['std']:.1g} m/s²"
+        return [("shared acceleration", f"{size}, of {self.shared['n_markers']:.0f} tracks")]
 
     def _filled(self) -> list[tuple[str, str]]:
         if self.filled is None:
@@ -145,6 +158,14 @@ def stitching_rows(info: Mapping[str, float]) -> list[tuple[str, str]]:
     return [("stitching", text)]
 
 
+def shared_figures(tracks: am.Tracks) -> dict[str, float] | None:
+    """Return the acceleration that rigid segments have in common; None without such segments."""
+    bonds = am.tracking.learn_bonds(dataclasses.replace(tracks, names=(None,) * tracks.n_tracks))
+    pairs = bonds.pairs[bonds.rigid]
+    size, std = am.tracking.shared_size(tracks, *pairs.T)
+    return {"size": size, "std": std, "n_markers": len(np.unique(pairs))} if size else None
+
+
 def summarize(result: am.tracking.Tracked, *, out: Path, method: str, seconds: float) -> Summary:
     """Compute the figures of a finished tracking.
 
@@ -188,6 +209,7 @@ def summarize(result: am.tracking.Tracked, *, out: Path, method: str, seconds: f
         places=len(places),
         expected_wrong=sum(place.expected_wrong for place in places),
         info=info,
+        shared=shared_figures(tracks) if result.recipe.options.get("rigid") else None,
         naming=None if naming is None else naming_figures(naming),
         filled=None
         if filling is None

@@ -15,6 +15,7 @@ are of its own motion alone, the first `N_OWN`.
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -75,6 +76,10 @@ class SharedAcceleration:
         Position of the markers themselves in these frames.
     weights : ndarray of shape (K, C)
         Weight of each of the `COMPONENTS`, with the sum 1.
+    size, size_std : float
+        Standard deviation of the acceleration that bonded markers have in common, as the σ of
+        `DWNA`, m/s², and its standard error. They describe the capture; the density does not depend
+        on them.
 
     Examples
     --------
@@ -83,7 +88,7 @@ class SharedAcceleration:
     >>> model = am.estimate_model(truth.detections).model
     >>> shared = am.tracking.learn_shared_acceleration(truth, model)
     >>> shared
-    SharedAcceleration(53 markers, 704 bonds, weight of own motion 0.09)
+    SharedAcceleration(53 markers, 704 bonds, 10 m/s² in common, weight of own motion 0.09)
     """
 
     offsets: NDArray[np.int64]
@@ -93,12 +98,15 @@ class SharedAcceleration:
     shape: NDArray[np.float64]
     own_shape: NDArray[np.float64]
     weights: NDArray[np.float64]
+    size: float = 0.0
+    size_std: float = math.nan
 
     def __repr__(self) -> str:
         own = float(self.weights[:, :N_OWN].sum(axis=1).mean()) if len(self.weights) else 1.0
+        common = f"{self.size:.2g} m/s²" if self.size else "nothing"
         return (
-            f"SharedAcceleration({len(self.weights)} markers, {len(self.others)} bonds, weight of "
-            f"own motion {own:.2f})"
+            f"SharedAcceleration({len(self.weights)} markers, {len(self.others)} bonds, {common} "
+            f"in common, weight of own motion {own:.2f})"
         )
 
     @cached_property

@@ -32,7 +32,7 @@ from asterism.tracking.naming import (
 )
 from asterism.tracking.pipeline import Tracked, carry_out, track
 from asterism.tracking.plan import Plan, plan_tracking
-from asterism.tracking.rigidity import Bonds, learn_bonds, learn_shared_acceleration
+from asterism.tracking.rigidity import Bonds, learn_bonds, learn_shared_acceleration, shared_size
 from asterism.tracking.stitching import (
     Join,
     Stitched,
@@ -88,6 +88,7 @@ __all__ = [
     "method_by_name",
     "name_tracks",
     "plan_tracking",
+    "shared_size",
     "stitch",
     "track",
     "track_states",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,11 +11,13 @@ from asterism.checks import check_kind
 from asterism.model import TrackingModel, Tracks
 from asterism.model.shared_acceleration import (
     COMPONENTS,
+    N_OWN,
     SharedAcceleration,
     shared_densities,
 )
 from asterism.tracking.rigidity.distances import Distances, distances_between
 from asterism.tracking.rigidity.sampled import sampled_positions
+from asterism.tracking.rigidity.shared_size import shared_size
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -40,7 +43,8 @@ def learn_shared_acceleration(tracks: Tracks, model: TrackingModel) -> SharedAcc
     Bonds are those of all distances, and a marker comes after those of smaller number. Its shape is
     the positions in the frame whose distances are most usual. The weights of the predictions
     maximise the density of the detections (EM); those of each marker are drawn to those of all, and
-    that of own motion is at least `ALONE`.
+    that of own motion is at least `ALONE`. The acceleration in common is that of markers which
+    neighbours predict better than own motion does, each with its steadiest bond (`shared_size`).
 
     Parameters
     ----------
@@ -59,7 +63,7 @@ def learn_shared_acceleration(tracks: Tracks, model: TrackingModel) -> SharedAcc
     >>> truth = am.simulate.swarm(frames=300, seed=1)  # independent markers
     >>> model = am.estimate_model(truth.detections).model
     >>> am.tracking.learn_shared_acceleration(truth, model)
-    SharedAcceleration(30 markers, 72 bonds, weight of own motion 0.98)
+    SharedAcceleration(30 markers, 72 bonds, nothing in common, weight of own motion 0.98)
     """
     check_kind("tracks", tracks, Tracks, "am.track(detections)")
     check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
@@ -88,10 +92,10 @@ def learn_shared_acceleration(tracks: Tracks, model: TrackingModel) -> SharedAcc
     )  # fmt: skip
     densities, _ = shared_densities(tracks, model, shared)
     weights = _fitted_weights(densities, tracks.labels, K)
-    return SharedAcceleration(
-        offsets=shared.offsets, others=shared.others, distances=shared.distances,
-        variances=shared.variances, shape=shared.shape, own_shape=own_shape, weights=weights,
-    )  # fmt: skip
+    is_led = (weights[:, :N_OWN].sum(axis=1) < 0.5) & (np.diff(offsets) > 0)
+    steadiest = np.array(offsets[:-1])[is_led]
+    size, size_std = shared_size(tracks, marker[steadiest], others[steadiest])
+    return dataclasses.replace(shared, weights=weights, size=size, size_std=size_std)
 
 
 def _usual_frame(
