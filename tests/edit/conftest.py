@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from tests.edit.editors import tracked_once
 from tests.edit.served import Served, write_capture
 from tests.reporting.browser import Browser
 
@@ -13,6 +14,13 @@ def browser():
     made = Browser()
     yield made
     made.close()
+
+
+@pytest.fixture(autouse=True)
+def _sessions():
+    """Expected sessions of the capture are not tracked again in each test."""
+    with tracked_once():
+        yield
 
 
 @pytest.fixture

@@ -14,33 +14,33 @@ import time
 from pathlib import Path
 from urllib.parse import parse_qs, urlparse
 
-import asterism as am
+from tests.edit.editors import CAPTURE, Forked, write_capture
 
-CAPTURE = "trial.c3d"
+__all__ = ["CAPTURE", "Served", "wait", "write_capture"]
 _PATIENCE = 60.0
 
 
-def write_capture(folder):
-    """Write a capture with uncertain decisions."""
-    scene = am.simulate.person(frames=250, seed=8)
-    truth = am.simulate.corrupt(
-        scene, missing=0.15, missing_run=12, clutter=0.02, noise=0.001, seed=8
-    )
-    am.write(truth.detections, Path(folder) / CAPTURE)
+def _command(folder, options):
+    """Start the command as a shell does."""
+    run = "import sys; from asterism.cli import main; sys.exit(main(sys.argv[1:]))"
+    # A group that ignores no signal, as a shell in the background would have it.
+    return subprocess.Popen(
+        [sys.executable, "-c", run, "edit", CAPTURE, *options],
+        cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
 
 
 class Served:
-    """``asterism edit`` in a folder, from its start to its end by Ctrl-C."""
+    """``asterism edit`` in a folder, from its start to its end by Ctrl-C.
 
-    def __init__(self, folder, *options):
+    It runs in a forked process where the capture is tracked already, or as a command of its own.
+    """
+
+    def __init__(self, folder, *options, is_command=False):
         self.folder, self.readers = Path(folder), []
-        run = "import sys; from asterism.cli import main; sys.exit(main(sys.argv[1:]))"
-        # A group that ignores no signal, as a shell in the background would have it.
-        self.process = subprocess.Popen(
-            [sys.executable, "-c", run, "edit", CAPTURE, "--no-browser", "--json", *options],
-            cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-        )  # fmt: skip
+        options = ["--no-browser", "--json", *options]
+        self.process = (_command if is_command else Forked)(folder, options)
         text = ""
         while not text.endswith("}\n"):
             line = self.process.stdout.readline()

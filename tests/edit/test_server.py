@@ -169,12 +169,12 @@ def test_saved_files_are_named_and_never_the_input(served):
 
 
 def test_a_session_is_continued_and_stopped(folder):
-    served = Served(folder)
+    served = Served(folder, is_command=True)
     _, message = same(served)
     served.post("edit", **message)
     served.listen()  # an open page does not hold it up
     assert served.stop(signal.SIGTERM)[0] == 0
-    served = Served(folder)
+    served = Served(folder, is_command=True)
     events = served.listen()
     wait(lambda: bool(events))
     assert len(events[0][1]["edits"]) == 1
