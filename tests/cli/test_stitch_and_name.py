@@ -22,7 +22,7 @@ def recorded(tmp_path_factory):
         str(folder / name) for name in ("person.csv", "p.c3d", "pt.c3d", "alone.c3d")
     )
     options = "--burst 5:5-60 --ghosts 3:1-10 --noise 0.0003 --seed 1 -q"
-    assert main(["simulate", "person", "-o", person, "--seed=1", "-q"]) == 0
+    assert main(["simulate", "person", "-o", person, "--frames=200", "--seed=1", "-q"]) == 0
     assert main(["corrupt", person, "-o", p, "--truth", truth, *options.split()]) == 0
     assert main(["track", p, "--method", "gnn", "-o", alone, "-q"]) == 0
     assert main(["markerset", "learn", person, "-o", str(folder / "set.toml"), "-q"]) == 0

@@ -140,5 +140,5 @@ def held_to_reference(seed):
 
 
 def test_labels_are_those_of_the_reference():
-    n = sized(60, 3)
+    n = sized(30, 3)
     assert sum(held_to_reference(seed) for seed in range(n)) > 3 * n

@@ -38,6 +38,13 @@ def followed(items, model, *, method=None, **options):
     return run, sink.frames
 
 
+@pytest.fixture(scope="module")
+def clean(scene):
+    """Frames of the stream without a fault."""
+    made, model = scene
+    return followed(frames_of(made.detections), model)[1]
+
+
 @pytest.mark.parametrize(
     "method", [am.GNN(), am.JPDA(), am.TOMHT(), Stitched()], ids=lambda m: m.name
 )
@@ -105,9 +112,8 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("faults", FAULTS.values(), ids=FAULTS)
-def test_faults_of_the_network_cost_no_identity(scene, faults, caplog):
+def test_faults_of_the_network_cost_no_identity(scene, clean, faults, caplog):
     made, model = scene
-    clean = followed(frames_of(made.detections), model)[1]
     rng = np.random.default_rng(5)
     with caplog.at_level(logging.WARNING, logger="asterism"):
         run, frames = followed(with_faults(frames_of(made.detections), rng, **faults), model)
