@@ -70,7 +70,7 @@ def test_tracks_of_the_slow_start_alone_are_left_out():
 
 
 def test_a_further_pass_is_repeated_by_its_recipe():
-    walk = am.simulate.person(activity="walk", frames=600, seed=21)
+    walk = am.simulate.person(activity="walk", frames=300, seed=21)
     truth = am.simulate.corrupt(walk, missing=0.1, clutter=0.1, noise=3e-4, stride=6, seed=21)
     d = truth.detections
     recipe = plan_tracking(d, stitch=True).recipe
