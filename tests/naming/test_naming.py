@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 import pytest
 
 import asterism as am
 from tests.scenes import moving
+
+
+@functools.cache
+def person(seed):
+    """A person, and its marker set."""
+    truth = am.simulate.person(seed=seed)
+    return truth, am.learn_marker_set(truth)
 
 
 def shuffled(tracks, seed):
@@ -117,7 +126,7 @@ def test_markers_outside_the_set_have_no_name():
 
 def test_a_set_of_another_body_gives_no_name():
     rng = np.random.default_rng(8)
-    made = am.learn_marker_set(am.simulate.person(seed=1))
+    _, made = person(1)
     t, places = moving(rng.uniform(-0.8, 0.8, (30, 3)), seed=2)
     found = am.name_tracks(am.Tracks.from_dense(t, places), made)
     assert found.n_named == 0
@@ -136,7 +145,7 @@ def test_missing_markers_leave_their_names_unused():
 
 
 def test_captures_without_anything_to_name():
-    made = am.learn_marker_set(am.simulate.person(seed=1))
+    _, made = person(1)
     empty = am.Tracks.from_dense(np.arange(5) / 100, np.full((5, 2, 3), np.nan))
     assert am.name_tracks(empty, made).n_named == 0
     with pytest.raises(am.ParameterError, match="tracks with names"):
@@ -177,16 +186,16 @@ def test_a_track_after_a_marker_has_gone_is_not_yet_that_marker():
 
 
 def test_a_set_whose_subject_is_absent_names_nothing():
-    one, other = am.simulate.person(seed=1), am.simulate.person(seed=2)
-    sets = [am.learn_marker_set(t).of_subject(name) for t, name in ((one, "A"), (other, "B"))]
+    (one, set_of_one), (_, set_of_other) = person(1), person(2)
+    sets = [set_of_one.of_subject("A"), set_of_other.of_subject("B")]
     found = am.name_tracks(am.Tracks(detections=one.detections, labels=one.labels), *sets)
     assert set(found.markers) == {f"A:{name}" for name in one.names}
 
 
 @pytest.mark.parametrize("apart", [0.4, 1.5])
 def test_two_bodies_that_move_in_step_have_their_own_names(apart):
-    one, other = am.simulate.person(seed=1), am.simulate.person(seed=2)
-    sets = [am.learn_marker_set(t).of_subject(name) for t, name in ((one, "A"), (other, "B"))]
+    (one, set_of_one), (other, set_of_other) = person(1), person(2)
+    sets = [set_of_one.of_subject("A"), set_of_other.of_subject("B")]
     places = np.concatenate([one.positions(), other.positions() + np.array([0, apart, 0])], axis=1)
     found = am.name_tracks(am.Tracks.from_dense(one.detections.times, places), *sets)
     right = [f"A:{name}" for name in one.names] + [f"B:{name}" for name in other.names]
