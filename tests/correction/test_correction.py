@@ -12,10 +12,10 @@ import asterism as am
 from asterism.edit import Session
 from asterism.model import Edit
 from asterism.simulate import Burst, Ghosts
+from asterism.tracking.attempts.uncorrected import Uncorrected
 from asterism.tracking.correction.change import change_of, without_improbable
 from asterism.tracking.correction.constraints import Constraints, detections_of
 from asterism.tracking.correction.solver import Solver
-from asterism.tracking.uncorrected import Uncorrected
 from tests.scenes import sized
 
 

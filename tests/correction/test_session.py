@@ -9,8 +9,8 @@ import asterism as am
 from asterism.edit import Session
 from asterism.model import Alternative, Decision, Edit
 from asterism.simulate import Burst, Ghosts
+from asterism.tracking.attempts.uncorrected import Uncorrected
 from asterism.tracking.correction.constraints import detections_of
-from asterism.tracking.uncorrected import Uncorrected
 
 
 @pytest.fixture(scope="module")

@@ -15,17 +15,21 @@ import pytest
 import asterism as am
 from asterism.cli import main
 from asterism.simulate import Burst
-from asterism.tracking.attempts import attempt, most_certain
-from asterism.tracking.choose import ON_BODIES, partners
-from asterism.tracking.own_distances import (
+from asterism.tracking.attempts.most_certain import attempt, most_certain
+from asterism.tracking.attempts.own_distances import (
     _reassigned,
     assigned_again,
     exchanged_by_spreads,
     refined_by_own_distances,
 )
+from asterism.tracking.attempts.uncorrected import Uncorrected
+from asterism.tracking.choose import ON_BODIES, partners
 from asterism.tracking.stitching.exchanged import with_markers
-from asterism.tracking.uncorrected import Uncorrected
 from tests.scenes import exchanged, steady_and_loose
+
+MOST_CERTAIN = "asterism.tracking.attempts.most_certain"
+OWN_DISTANCES = "asterism.tracking.attempts.own_distances"
+DOUBTFUL = "asterism.tracking.attempts.uncorrected.DOUBTFUL"
 
 
 def sensed(truth, noise=0.005, **more):
@@ -151,7 +155,7 @@ def test_detections_of_a_doubtful_result_are_assigned_again(monkeypatch):
     run = am.simulate.person(activity="run", frames=150, seed=12)
     truth = am.simulate.corrupt(run, missing=0.1, clutter=0.1, noise=3e-4, stride=3, seed=12)
     made = []
-    name = "asterism.tracking.own_distances._reassigned"
+    name = f"{OWN_DISTANCES}._reassigned"
     monkeypatch.setattr(name, lambda found: made.append(found) or found)
     am.track(truth.detections)
     monkeypatch.undo()
@@ -165,7 +169,7 @@ def test_detections_of_a_doubtful_result_are_assigned_again(monkeypatch):
 
 
 def test_ghosts_beside_the_markers_of_a_cube_are_left_alone(monkeypatch):
-    made, name = [], "asterism.tracking.own_distances._reassigned"
+    made, name = [], f"{OWN_DISTANCES}._reassigned"
     monkeypatch.setattr(name, lambda found: made.append(found) or found)
     truths, firsts = [], []
     for seed in (51, 53, 54):
@@ -250,9 +254,9 @@ def test_bonds_must_make_identities_more_certain_by_a_margin(gain, is_kept, monk
     def planned(recipe, *_, **__):
         return Planned(tracks=walk, recipe=recipe, model=recipe.model)
 
-    monkeypatch.setattr("asterism.tracking.attempts.attempt", planned)
-    monkeypatch.setattr("asterism.tracking.attempts.next_pass", lambda found, _: found)
-    monkeypatch.setattr("asterism.tracking.attempts.refined_by_own_distances", lambda found: found)
+    monkeypatch.setattr(f"{MOST_CERTAIN}.attempt", planned)
+    monkeypatch.setattr(f"{MOST_CERTAIN}.next_pass", lambda found, _: found)
+    monkeypatch.setattr(f"{MOST_CERTAIN}.refined_by_own_distances", lambda found: found)
     best = most_certain(plan.recipe, walk.detections)
     assert (best.recipe.method == "tomht", best.has_bonds) == (is_kept, is_kept)
 
@@ -268,9 +272,9 @@ def test_a_method_with_bonds_needs_no_attempt_without_them(monkeypatch):
         made.append((recipe.method, recipe.options.get("rigid") is not None))
         return Planned(tracks=walk, recipe=recipe, model=recipe.model)
 
-    monkeypatch.setattr("asterism.tracking.attempts.attempt", planned)
-    monkeypatch.setattr("asterism.tracking.attempts.next_pass", lambda found, _: found)
-    monkeypatch.setattr("asterism.tracking.attempts.refined_by_own_distances", lambda found: found)
+    monkeypatch.setattr(f"{MOST_CERTAIN}.attempt", planned)
+    monkeypatch.setattr(f"{MOST_CERTAIN}.next_pass", lambda found, _: found)
+    monkeypatch.setattr(f"{MOST_CERTAIN}.refined_by_own_distances", lambda found: found)
     most_certain(recipe, walk.detections)
     assert made == [("smp", True), ("tomht", True), ("tomht", True)]  # two motions
     made.clear()
@@ -291,9 +295,9 @@ def test_labels_change_until_identities_are_no_more_certain_where_bonds_hold(
         tracks = dataclasses.replace(walk, info={"share": next(shares)})
         return dataclasses.replace(found, tracks=tracks)
 
-    monkeypatch.setattr("asterism.tracking.own_distances._reassigned", assigned)
+    monkeypatch.setattr(f"{OWN_DISTANCES}._reassigned", assigned)
     for name in ("exchanged_by_spreads", "_with_lost_markers"):
-        monkeypatch.setattr(f"asterism.tracking.own_distances.{name}", lambda found: found)
+        monkeypatch.setattr(f"{OWN_DISTANCES}.{name}", lambda found: found)
     tracks = dataclasses.replace(walk, info={"share": 0.75})
     found = InTurn(tracks=tracks, recipe=recipe, model=recipe.model)
     assert assigned_again(found).tracks.info["share"] == kept
@@ -318,9 +322,9 @@ def test_tomht_alone_or_the_other_motion_is_the_third_attempt(shares, expected, 
         made.append(recipe.options.get("rigid") is not None)
         return InTurn(tracks=tracks, recipe=recipe, model=recipe.model)
 
-    monkeypatch.setattr("asterism.tracking.attempts.attempt", planned)
-    monkeypatch.setattr("asterism.tracking.attempts.next_pass", lambda found, _: found)
-    monkeypatch.setattr("asterism.tracking.attempts.refined_by_own_distances", lambda found: found)
+    monkeypatch.setattr(f"{MOST_CERTAIN}.attempt", planned)
+    monkeypatch.setattr(f"{MOST_CERTAIN}.next_pass", lambda found, _: found)
+    monkeypatch.setattr(f"{MOST_CERTAIN}.refined_by_own_distances", lambda found: found)
     best = most_certain(recipe, walk.detections)
     assert made == expected
     assert best.tracks.info["share"] == max(shares)
@@ -341,7 +345,7 @@ def test_certain_identities_need_no_further_attempt(monkeypatch):
         raise AssertionError("a further attempt")
 
     monkeypatch.setattr("asterism.tracking.methods.tomht.TOMHT._tracker", never)
-    monkeypatch.setattr("asterism.tracking.own_distances.learn_marker_set", never)
+    monkeypatch.setattr(f"{OWN_DISTANCES}.learn_marker_set", never)
     tracks = am.track(truth.detections, model=model)
     assert (tracks.recipe.method, "refinements" in tracks.info) == ("smp", False)
 
@@ -380,14 +384,14 @@ def test_names_that_make_identities_less_certain_are_not_kept(fast, monkeypatch)
         labels[late & (given.labels == 0)], labels[late & (given.labels == 1)] = 1, 0
         return SimpleNamespace(tracks=dataclasses.replace(given, labels=labels))
 
-    monkeypatch.setattr("asterism.tracking.own_distances.name_tracks", exchanged)
+    monkeypatch.setattr(f"{OWN_DISTANCES}.name_tracks", exchanged)
     assert found.is_doubtful
     assert refined_by_own_distances(found) is found
 
 
 @pytest.mark.parametrize("is_doubtful", [True, False])
 def test_tracks_in_doubt_are_exchanged_back_by_the_spreads_of_distances(is_doubtful, monkeypatch):
-    monkeypatch.setattr("asterism.tracking.uncorrected.DOUBTFUL", -1.0 if is_doubtful else 1.0)
+    monkeypatch.setattr(DOUBTFUL, -1.0 if is_doubtful else 1.0)
     truth = steady_and_loose(seed=1)
     recipe = am.tracking.plan_tracking(truth.detections).recipe
     model = am.tracking.tracklet_model(recipe.model)
@@ -407,7 +411,7 @@ def test_tracks_in_doubt_are_exchanged_back_by_the_spreads_of_distances(is_doubt
 
 @pytest.mark.parametrize("kept", [3, 0])
 def test_too_few_tracks_are_not_named_by_their_own_distances(kept, monkeypatch):
-    monkeypatch.setattr("asterism.tracking.uncorrected.DOUBTFUL", -1.0)
+    monkeypatch.setattr(DOUBTFUL, -1.0)
     walk = am.simulate.person(activity="walk", frames=60, seed=1)
     few = am.Tracks(
         detections=walk.detections, labels=np.where(walk.labels < kept, walk.labels, -1)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from asterism.model import Alternative, MarkerSet, Tracks
     from asterism.tracking import Change
-    from asterism.tracking.uncorrected import Uncorrected
+    from asterism.tracking.attempts.uncorrected import Uncorrected
 
 __all__ = ["Session"]
 

@@ -11,7 +11,7 @@ from asterism.errors import ParameterError
 from asterism.model import Detections, Edit, MarkerSet, Recipe, TrackingModel, Tracks
 from asterism.model.recipe import hash_of_edits, sha256_of, versions
 from asterism.records import record
-from asterism.tracking.attempts import attempt, most_certain
+from asterism.tracking.attempts.most_certain import attempt, most_certain
 from asterism.tracking.correction import correct, settled
 from asterism.tracking.decisions import of_filling, of_naming, of_stitching
 from asterism.tracking.filling import LONGEST, fill_gaps
@@ -21,10 +21,10 @@ from asterism.tracking.plan import hash_of_names, plan_tracking
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from asterism.tracking.attempts.uncorrected import Uncorrected
     from asterism.tracking.filling import Filling
     from asterism.tracking.methods import Method
     from asterism.tracking.naming import Naming
-    from asterism.tracking.uncorrected import Uncorrected
 
 __all__ = ["Tracked", "carry_out", "conclude", "track", "without_edits"]
 

@@ -7,12 +7,17 @@ import dataclasses
 import numpy as np
 
 import asterism as am
-from asterism.tracking.attempts import attempt, next_pass
+from asterism.tracking.attempts.most_certain import attempt, next_pass
+from asterism.tracking.attempts.own_distances import refined_by_own_distances
+from asterism.tracking.attempts.slow_start import (
+    MAX_FRAMES,
+    SLOWER,
+    after_slow_start,
+    with_slow_start,
+)
 from asterism.tracking.estimation import fit_body_motion
 from asterism.tracking.methods import options_of
-from asterism.tracking.own_distances import refined_by_own_distances
 from asterism.tracking.plan import plan_tracking
-from asterism.tracking.slow_start import MAX_FRAMES, SLOWER, after_slow_start, with_slow_start
 
 
 def two_markers(**fields):

@@ -8,10 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 
 import asterism as am
-from asterism.tracking import own_distances
+from asterism.tracking.attempts import own_distances
+from asterism.tracking.attempts.uncorrected import Uncorrected
 from asterism.tracking.methods import TOMHT, Rigidity, options_of
 from asterism.tracking.plan import plan_tracking
-from asterism.tracking.uncorrected import Uncorrected
 
 HIDDEN, FIRST, LAST = (3, 4), 60, 100
 

@@ -5,7 +5,7 @@ import pytest
 
 import asterism as am
 from asterism import _engine
-from asterism.tracking.lost import with_lost_markers
+from asterism.tracking.attempts.lost import with_lost_markers
 from tests.references.lost_markers import found_in_frame
 
 NOISE = 2e-4

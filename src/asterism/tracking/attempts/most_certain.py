@@ -9,13 +9,13 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING, Any
 
+from asterism.tracking.attempts.own_distances import assigned_again, refined_by_own_distances
+from asterism.tracking.attempts.slow_start import after_slow_start, with_slow_start
+from asterism.tracking.attempts.uncorrected import DOUBTFUL, Uncorrected
 from asterism.tracking.estimation import OVER_THREE_FRAMES, fit_body_motion, fit_to_tracks
 from asterism.tracking.methods import GNN, METHODS, TOMHT, Rigidity, method_by_name, options_of
 from asterism.tracking.methods.associate import associate
-from asterism.tracking.own_distances import assigned_again, refined_by_own_distances
-from asterism.tracking.slow_start import after_slow_start, with_slow_start
 from asterism.tracking.stitching import stitch, tracklet_model
-from asterism.tracking.uncorrected import DOUBTFUL, Uncorrected
 
 if TYPE_CHECKING:
     from collections.abc import Callable

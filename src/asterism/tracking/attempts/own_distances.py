@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.metrics import oracle_tracks
+from asterism.tracking.attempts.lone import with_lone_detections
+from asterism.tracking.attempts.lost import with_lost_markers
 from asterism.tracking.confidence.identity import OTHER_JOIN
 from asterism.tracking.confidence.reassign import ghost_log_odds, reassigned
-from asterism.tracking.lone import with_lone_detections
-from asterism.tracking.lost import with_lost_markers
 from asterism.tracking.naming import learn_marker_set, name_tracks
 from asterism.tracking.stitching import stitch
 from asterism.tracking.stitching.exchanged import exchanged_back, with_markers
@@ -19,7 +19,7 @@ from asterism.tracking.stitching.exchanged import exchanged_back, with_markers
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from asterism.tracking.uncorrected import Uncorrected
+    from asterism.tracking.attempts.uncorrected import Uncorrected
 
 __all__ = ["assigned_again", "exchanged_by_spreads", "refined_by_own_distances"]
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import asterism as am
-from asterism.tracking.lone import with_lone_detections
+from asterism.tracking.attempts.lone import with_lone_detections
 
 CUBE = am.simulate.corrupt(am.simulate.cube(frames=60, seed=1), noise=3e-4, seed=1)
 TRUTH = am.Tracks.from_dense(CUBE.detections.times, CUBE.positions())

@@ -1,0 +1,1 @@
+"""What follows the first method while identities are uncertain: further attempts, reassignment."""
