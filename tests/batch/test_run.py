@@ -63,11 +63,54 @@ def test_finished_work_is_known_by_its_content(captures, out):
     source = captures / "second" / "walk.c3d"
     source.write_bytes((captures / "first" / "walk.c3d").read_bytes())
     again = am.batch.run([captures], out, workers=1)
-    assert "found another. Give overwrite" in again.failed["second/walk.c3d"]
+    assert "found another. Give overwrite" in again.changed["second/walk.c3d"]
+    assert set(again.failed) == {"second/damaged.c3d"}
     assert contents(out) == before
     again = am.batch.run([captures], out, workers=1, overwrite=True)
     assert (again.n_tracked, again.n_done_before) == (1, 2)
     assert contents(out) != before
+
+
+def test_results_of_other_settings_keep_their_figures(captures, out, capsys):
+    def rows():
+        with (out / "summary.csv").open(encoding="utf-8", newline="") as file:
+            return {row["capture"]: row for row in csv.DictReader(file)}
+
+    am.batch.run([captures], out, workers=1)
+    before, files = rows(), contents(out)
+    line = ["batch", str(captures), "-o", str(out), "--workers", "1", "--format", "csv"]
+    # Without a page, and in another format: the index has the links of the results that are there.
+    line += ["--fill", "--no-report"]
+    assert main(line) == 1
+    printed = capsys.readouterr().out
+    assert "changed  3, of another input, settings or versions: kept" in printed
+    assert "first/walk.c3d" in printed
+    assert "Give --overwrite" in printed
+    assert "failed   1" in printed
+    assert contents(out) == files
+    after = rows()
+    for name, row in after.items():
+        if name == "second/damaged.c3d":
+            assert row["state"] == "failed"
+            continue
+        assert row["state"] == "changed"
+        stem = name.rpartition(".")[0]
+        result = out / f"{stem}.tracked{Path(name).suffix}"
+        assert row["reason"].startswith(f"{result}: expected a result of the same input, settings")
+        assert row | {"state": "tracked", "reason": ""} == before[name]
+    page = (out / "index.html").read_text(encoding="utf-8")
+    assert "Without a result: 1. With a result of another input or settings: 3." in page
+    assert 'href="first/walk.tracked.html"' in page
+    assert main([*line, "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert (len(found["changed"]), list(found["failed"])) == (3, ["second/damaged.c3d"])
+    assert main([*line, "--dry-run"]) == 0
+    assert capsys.readouterr().out.count(" changed ") == 3
+    # The settings of before find their results again.
+    assert repr(am.batch.run([captures], out, workers=1)) == (
+        "Batch(0 captures tracked, 3 done before, 1 failed)"
+    )
+    assert rows() == before
 
 
 @pytest.mark.parametrize("change", ["settings", "marker set", "edits"])

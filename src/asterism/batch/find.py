@@ -6,7 +6,7 @@ import dataclasses
 import json
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 from asterism.batch.job import Job, Settings, key_of
 from asterism.batch.result_file import output_format
@@ -26,7 +26,6 @@ from asterism.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
-    from typing import Any
 
 __all__ = ["MARKER_SET", "Planned", "captures_below", "plan_batch"]
 
@@ -50,7 +49,7 @@ class Planned:
         ``new``; ``done``, if the output folder holds the result of the same input and settings;
         ``changed``, if it holds that of others; ``failed``, if the input cannot be read.
     reason : str
-        Reason of the state ``failed``.
+        Reason of the states ``changed`` and ``failed``.
     """
 
     job: Job
@@ -128,8 +127,15 @@ def _examined(job: Job, out: str, reason: str) -> Planned:
         before = json.loads(read_bytes(inside(out, job.summary)))
     except (FormatError, ValueError):
         return Planned(job=job, state="new")
-    same = isinstance(before, dict) and before.get("key") == job.key
-    return Planned(job=job, state="done" if same else "changed")
+    before = cast("dict[str, Any]", before) if isinstance(before, dict) else {}
+    if before.get("key") == job.key:
+        return Planned(job=job, state="done")
+    reason = (
+        f"{inside(out, before.get('output', job.output))}: expected a result of the same input, "
+        "settings and versions, found another. Give overwrite=True (--overwrite) to track the "
+        "capture again, or another output folder to keep both."
+    )
+    return Planned(job=job, state="changed", reason=reason)
 
 
 def captures_below(folder: str) -> list[str]:

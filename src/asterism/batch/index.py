@@ -44,9 +44,10 @@ _STYLE = (
     "tbody th{min-width:24ch;font-weight:600;overflow-wrap:anywhere;white-space:normal}"
     "td.why{text-align:left;white-space:normal;overflow-wrap:anywhere}"
     "a{color:var(--accent)}.clear{color:var(--clear)}.some{color:var(--some)}"
-    ".many{color:var(--many);font-weight:600}"
+    ".many{color:var(--many);font-weight:600}.note{color:var(--many);font-weight:400}"
 )
 _FIRST = b"capture,state,reason,"  # of a table of a batch
+_WITHOUT = ("failed", "not tracked")  # states of captures without a result
 _MANY = 5  # places from which their number is shown as many
 
 
@@ -59,12 +60,18 @@ def holds_batch(out: str) -> bool:
 
 
 def write_index(
-    out: str, jobs: Sequence[Job], failed: Mapping[str, str], *, parquet: bool, overwrite: bool
+    out: str,
+    jobs: Sequence[Job],
+    failed: Mapping[str, str],
+    changed: Mapping[str, str],
+    *,
+    parquet: bool,
+    overwrite: bool,
 ) -> None:
     """Write ``index.html`` and ``summary.csv`` from the summaries in the output folder.
 
-    Captures without a result come first, then those with the largest expected number of wrong
-    labels.
+    Captures without a result come first, then those whose result is of another input or settings.
+    In each of these groups, those with the largest expected number of wrong labels come first.
 
     Parameters
     ----------
@@ -74,6 +81,9 @@ def write_index(
         Captures of the batch.
     failed : mapping of str
         Reasons by the name of each capture without a result.
+    changed : mapping of str
+        Reasons by the name of each capture whose result is of another input or settings. Its
+        figures are those of this result.
     parquet : bool
         Whether ``summary.parquet`` is written too, with the same rows and typed columns.
     overwrite : bool
@@ -84,7 +94,7 @@ def write_index(
     FormatError
         If a file cannot be written.
     """
-    rows = sorted((_row(out, job, failed.get(job.name, "")) for job in jobs), key=_need)
+    rows = sorted((_row(out, job, failed, changed) for job in jobs), key=_need)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(_COLUMNS)
@@ -119,42 +129,60 @@ def _parquet(rows: Sequence[Mapping[str, Any]]) -> bytes:
     return sink.getvalue()
 
 
-def _row(out: str, job: Job, reason: str) -> dict[str, Any]:
+def _row(
+    out: str, job: Job, failed: Mapping[str, str], changed: Mapping[str, str]
+) -> dict[str, Any]:
     """Return the figures of a capture by column."""
     row: dict[str, Any] = dict.fromkeys(_COLUMNS, "")
-    row |= {"capture": job.name, "input": job.source, "key": job.key, "reason": reason}
+    row |= {"capture": job.name, "input": job.source, "key": job.key}
+    if job.name in failed:
+        return row | {"state": "failed", "reason": failed[job.name]}
     try:
-        if reason:
-            raise ValueError(reason)
         values: dict[str, Any] = json.loads(read_bytes(inside(out, job.summary)))
     except (FormatError, ValueError):
-        return row | {"state": "failed" if reason else "not tracked"}
+        return row | {"state": "not tracked"}
     naming, filled = values["naming"] or {}, values["filled"] or {}
+    is_changed = job.name in changed
     found = {name: values[name] for name in _COLUMNS if name in values}
     return (
         row
         | found
         | {
-            "state": "tracked",
+            "state": "changed" if is_changed else "tracked",
+            "reason": changed.get(job.name, ""),
             "expected_wrong": f"{values['expected_wrong']:.6g}",
             "n_named": len({one["name"] for one in naming["names"]}) if naming else "",
             "n_filled": filled.get("n_filled", ""),
-            "page": job.page or "",
+            "page": _page_of_other(out, values["output"]) if is_changed else job.page or "",
             "input": job.source,
         }
     )
 
 
-def _need(row: Mapping[str, Any]) -> tuple[bool, float, int, str]:
-    if row["state"] != "tracked":
-        return False, 0.0, 0, row["capture"]
-    return True, -float(row["expected_wrong"]), -int(row["places"]), row["capture"]
+def _page_of_other(out: str, output: str) -> str:
+    """Return the page of a result of other settings, which may have none."""
+    page = f"{output.rpartition('.')[0]}.html"
+    try:
+        read_bytes(inside(out, page), 1)
+    except FormatError:
+        return ""
+    return page
+
+
+def _need(row: Mapping[str, Any]) -> tuple[int, float, int, str]:
+    """Return what orders the rows; those that need a look come first."""
+    if row["state"] in _WITHOUT:
+        return 0, 0.0, 0, row["capture"]
+    group = 1 if row["state"] == "changed" else 2
+    return group, -float(row["expected_wrong"]), -int(row["places"]), row["capture"]
 
 
 def _page(rows: Sequence[Mapping[str, Any]]) -> str:
     n, places = len(rows), sum(int(row["places"] or 0) for row in rows)
-    failed = sum(row["state"] != "tracked" for row in rows)
+    failed = sum(row["state"] in _WITHOUT for row in rows)
+    changed = sum(row["state"] == "changed" for row in rows)
     lead = f"Captures: {n:,}. Without a result: {failed:,}. "
+    lead += f"With a result of another input or settings: {changed:,}. " if changed else ""
     lead += f"Places to check in the others: {places:,}."
     titles = (
         "capture", "places to check", "wrong labels expected", "tracks", "named", "labelled",
@@ -192,7 +220,7 @@ def _page(rows: Sequence[Mapping[str, Any]]) -> str:
 def _line(row: Mapping[str, Any]) -> Markup:
     """Return the row of one capture."""
     name = element("bdi", row["capture"])
-    if row["state"] != "tracked":
+    if row["state"] in _WITHOUT:
         why = row["reason"] or "not tracked yet"
         return element(
             "tr",
@@ -203,10 +231,11 @@ def _line(row: Mapping[str, Any]) -> Markup:
     linked = element("a", name, href=quote(target))
     places = int(row["places"])
     kind = "clear" if not places else "some" if places < _MANY else "many"
+    notes = [element("div", row["reason"], class_="note")] if row["reason"] else []
     share = 100 * int(row["n_labelled"]) / max(int(row["n_detections"]), 1)
     return element(
         "tr",
-        element("th", linked, scope="row"),
+        element("th", linked, *notes, scope="row"),
         element("td", element("span", f"{places:,}", class_=kind)),
         element("td", f"{float(row['expected_wrong']):,.0f}"),
         element("td", f"{row['n_tracks']:,}"),

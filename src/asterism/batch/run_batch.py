@@ -12,7 +12,7 @@ from asterism.batch.index import holds_batch, write_index
 from asterism.batch.job import Settings
 from asterism.batch.perform import Outcome, deliver_all, perform
 from asterism.batch.result_file import check_folder
-from asterism.batch.storage import inside, is_url, read_bytes
+from asterism.batch.storage import is_url, read_bytes
 from asterism.batch.tasks import number_of_workers, run_tasks
 from asterism.checks import check_extra, check_kind
 from asterism.errors import AsterismError, ParameterError
@@ -43,7 +43,7 @@ class Batch:
     planned : tuple of Planned
         Captures, with their state before the batch.
     outcomes : dict of Outcome
-        Outcomes of this run by the name of the capture; finished ones of earlier runs have none.
+        Outcomes of this run by the name of the capture; results of earlier runs have none.
     """
 
     out: str
@@ -56,19 +56,32 @@ class Batch:
         return {name: each.error for name, each in self.outcomes.items() if each.error}
 
     @property
+    def changed(self) -> dict[str, str]:
+        """Reasons by the name of each capture whose result is of another input or settings.
+
+        These results of earlier runs, or of other versions, are kept.
+        """
+        return {
+            each.job.name: each.reason
+            for each in self.planned
+            if each.state == "changed" and each.job.name not in self.outcomes
+        }
+
+    @property
     def n_tracked(self) -> int:
         """Number of captures that were tracked in this run."""
         return sum(not each.error for each in self.outcomes.values())
 
     @property
     def n_done_before(self) -> int:
-        """Number of captures with a result of an earlier run."""
-        return len(self.planned) - len(self.outcomes)
+        """Number of captures with the same result of an earlier run."""
+        return len(self.planned) - len(self.outcomes) - len(self.changed)
 
     def __repr__(self) -> str:
+        changed = f"{len(self.changed)} changed, " if self.changed else ""
         return (
             f"Batch({self.n_tracked} captures tracked, {self.n_done_before} done before, "
-            f"{len(self.failed)} failed)"
+            f"{changed}{len(self.failed)} failed)"
         )
 
 
@@ -91,7 +104,8 @@ def run(
     A result is finished when its summary is written. It holds the hash of the contents of the
     capture, of the marker sets and of the edits, and of the settings and the versions. A run with
     the same output folder repeats only what has no finished result with this hash. A capture that
-    fails does not stop the others.
+    fails does not stop the others. A result with another hash is kept, and its capture is in
+    `Batch.changed`.
 
     Parameters
     ----------
@@ -167,19 +181,18 @@ def run(
         progress=None if progress is None else lambda n, of: progress("", "examining", n, of),
     )  # fmt: skip
     jobs = [each.job for each in planned]
-    write_index(place, jobs, {}, parquet=parquet, overwrite=overwrite)
-    outcomes: dict[str, Outcome] = {}
+    outcomes = {
+        each.job.name: Outcome(error=each.reason) for each in planned if each.state == "failed"
+    }
+    batch = Batch(out=place, planned=tuple(planned), outcomes=outcomes)
+    write_index(place, jobs, batch.failed, batch.changed, parquet=parquet, overwrite=overwrite)
     todo: dict[str, Job] = {}
     for each in planned:
         job = each.job
         if each.state == "new" or (each.state == "changed" and overwrite):
             todo[job.name] = job
-            continue
-        if each.state != "done":
-            reason = _changed(place, job) if each.state == "changed" else each.reason
-            outcomes[job.name] = Outcome(error=reason)
-        if progress is not None:
-            progress(job.name, "done" if each.state == "done" else "failed", 0, 0)
+        elif progress is not None:
+            progress(job.name, "failed" if each.state == "failed" else "done", 0, 0)
 
     def arguments(name: str) -> tuple[Any, ...]:
         inputs = {file: read_bytes(file) for file in todo[name].inputs} if send else None
@@ -196,8 +209,7 @@ def run(
             progress(name, "failed" if outcome.error else "done", 0, 0)
     if not is_url(place):
         remove_leftovers(Path(place))
-    batch = Batch(out=place, planned=tuple(planned), outcomes=outcomes)
-    write_index(place, jobs, batch.failed, parquet=parquet, overwrite=overwrite)
+    write_index(place, jobs, batch.failed, batch.changed, parquet=parquet, overwrite=overwrite)
     return batch
 
 
@@ -215,13 +227,6 @@ def _delivered(result: Any, job: Job, out: str, *, overwrite: bool) -> Outcome:
     except AsterismError as error:
         return Outcome(error=str(error))
     return result
-
-
-def _changed(out: str, job: Job) -> str:
-    return (
-        f"{inside(out, job.output)}: expected a result of the same input, settings and versions, "
-        "found another. Give overwrite=True (--overwrite) to replace it."
-    )
 
 
 def _memory_of_machine(workers: int) -> int | None:

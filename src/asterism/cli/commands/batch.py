@@ -11,11 +11,13 @@ import typer
 from asterism.cli.console import Json, Overwrite, Quiet, console, print_json, print_table
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Sequence
+    from collections.abc import Callable, Generator, Iterable, Sequence
 
     import asterism as am
 
 __all__ = ["batch"]
+
+_LISTED = 5  # names of captures or files that are printed
 
 _In = Annotated[
     list[str], typer.Argument(metavar="IN", help="Captures and folders, by path or URL.")
@@ -91,7 +93,8 @@ def batch(
     The same line again tracks only what has no finished result of the same input and settings. A
     file markers.toml in a folder names the tracks of its captures, and trial.edits.toml corrects
     those of trial.c3d. The results, index.html and summary.csv are in the output folder. More than
-    one worker needs pip install 'asterism\[cluster]'. The exit code is 1 if a capture failed.
+    one worker needs pip install 'asterism\[cluster]'. The exit code is 1 if a capture failed, or
+    has a result of another input or other settings, which is kept without --overwrite.
 
     For example:
 
@@ -137,12 +140,12 @@ def batch(
     if json:
         values = {
             "output": out, "n_captures": len(done.planned), "n_tracked": done.n_tracked,
-            "n_done_before": done.n_done_before, "failed": done.failed,
+            "n_done_before": done.n_done_before, "changed": done.changed, "failed": done.failed,
         }  # fmt: skip
         print_json(values)
     elif not quiet:
         _print(done)
-    if done.failed:
+    if done.failed or done.changed:
         raise typer.Exit(1)
 
 
@@ -193,12 +196,19 @@ def _print_plan(planned: Sequence[am.batch.Planned], *, quiet: bool, json: bool)
         header = ("capture", "state", "result", "markers", "edits")
         table = [
             (
-                each.job.source, each.reason or each.state, each.job.output,
-                ", ".join(each.job.markers) or "–", each.job.edits or "–",
+                each.job.source, each.reason if each.state == "failed" else each.state,
+                each.job.output, ", ".join(each.job.markers) or "–", each.job.edits or "–",
             )
             for each in planned
         ]  # fmt: skip
         print_table(table, header)
+
+
+def _short(names: Iterable[str]) -> list[str]:
+    """Return the first names, and the number of the others."""
+    names = list(names)
+    more = len(names) - _LISTED
+    return [*names[:_LISTED], *([f"and {more:,} more"] if more > 0 else [])]
 
 
 def _print(done: am.batch.Batch) -> None:
@@ -207,6 +217,12 @@ def _print(done: am.batch.Batch) -> None:
 
     rows: list[tuple[str, Any]] = [("tracked", done.n_tracked)]
     rows += [("done before", done.n_done_before)] if done.n_done_before else []
+    if done.changed:
+        rows.append(
+            ("changed", f"{len(done.changed)}, of another input, settings or versions: kept")
+        )
+        rows += [("", line) for line in _short(done.changed)]
+        rows.append(("", "Give --overwrite to track them again, or another --out to keep both."))
     rows += [("failed", len(done.failed))] if done.failed else []
     rows += [("", reason) for reason in done.failed.values()]
     took = [each for each in done.outcomes.values() if not each.error]
