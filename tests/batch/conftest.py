@@ -45,6 +45,16 @@ def captures(made_captures, tmp_path):
     return shutil.copytree(made_captures, tmp_path / "captures")
 
 
+@pytest.fixture
+def truncated(captures):
+    """A capture of that folder, of which the last frames are missing."""
+    path = captures / "second" / "walk.c3d"
+    content = path.read_bytes()
+    begin = 512 * (int.from_bytes(content[16:18], "little") - 1)  # word 9: block of the data
+    path.write_bytes(content[: begin + (len(content) - begin) // 2])
+    return path
+
+
 @pytest.fixture(scope="session")
 def batch(made_captures, tmp_path_factory):
     """A batch that was never stopped."""

@@ -249,6 +249,33 @@ def test_a_full_disk_is_reported(captures, tmp_path, monkeypatch):
     assert am.batch.run([captures / "first"], tmp_path / "out", workers=1).n_tracked == 2
 
 
+def test_a_truncated_capture_needs_a_look(captures, truncated, tmp_path, caplog):
+    out, cut = tmp_path / "out", "cut off in frame "
+    batch = am.batch.run([captures], out, workers=1)
+    # Places to check are not what puts it before the others.
+    for path in out.rglob("summary.json"):
+        values = json.loads(path.read_text(encoding="utf-8"))
+        if values["input"] != str(truncated):
+            path.write_text(json.dumps(values | {"places": 9, "expected_wrong": 9.0}))
+    assert am.batch.run([captures], out, workers=1).n_done_before == 3
+    with (out / "summary.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert rows[1]["capture"] == "second/walk.c3d"
+    assert (rows[1]["state"], rows[1]["reason"]) == ("tracked", "")
+    assert cut in rows[1]["truncated"]
+    assert [row["truncated"] for row in rows if row is not rows[1]] == [""] * 3
+    page = (out / "index.html").read_text(encoding="utf-8")
+    assert "Cut off: 1." in page
+    assert page.index(cut) < page.index('href="first/walk.tracked.html"')
+    warnings = batch.outcomes["second/walk.c3d"].warnings
+    assert warnings[0].startswith(f"{truncated}: ")
+    assert cut in warnings[0]
+    result = out / "second" / "walk.tracked.c3d"
+    complete = f"{result}: holds the complete frames of a truncated capture, {truncated}"
+    assert warnings[1] == complete
+    assert complete in caplog.messages
+
+
 def test_what_another_has_put_there_is_kept(captures, tmp_path):
     for name in ("index.html", "summary.csv", "runs", "walk.tracked.c3d"):
         other = tmp_path / name.replace(".", "-")

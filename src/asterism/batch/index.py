@@ -23,9 +23,9 @@ __all__ = ["INDEX", "TABLE", "holds_batch", "write_index"]
 
 INDEX, TABLE, PARQUET = "index.html", "summary.csv", "summary.parquet"
 _COLUMNS = (
-    "capture", "state", "reason", "places", "expected_wrong", "n_tracks", "n_named", "n_frames",
-    "n_detections", "n_labelled", "n_clutter", "n_gaps", "n_filled", "method", "output", "page",
-    "input", "key",
+    "capture", "state", "reason", "truncated", "places", "expected_wrong", "n_tracks", "n_named",
+    "n_frames", "n_detections", "n_labelled", "n_clutter", "n_gaps", "n_filled", "method", "output",
+    "page", "input", "key",
 )  # fmt: skip
 _STYLE = (
     ":root{--paper:#f6f7f8;--card:#fff;--ink:#1d2329;--muted:#56606b;--line:#dde1e6;"
@@ -70,8 +70,9 @@ def write_index(
 ) -> None:
     """Write ``index.html`` and ``summary.csv`` from the summaries in the output folder.
 
-    Captures without a result come first, then those whose result is of another input or settings.
-    In each of these groups, those with the largest expected number of wrong labels come first.
+    Captures without a result come first, then those that are cut off or whose result is of another
+    input or settings. In each group, those with the largest expected number of wrong labels come
+    first.
 
     Parameters
     ----------
@@ -173,16 +174,18 @@ def _need(row: Mapping[str, Any]) -> tuple[int, float, int, str]:
     """Return what orders the rows; those that need a look come first."""
     if row["state"] in _WITHOUT:
         return 0, 0.0, 0, row["capture"]
-    group = 1 if row["state"] == "changed" else 2
-    return group, -float(row["expected_wrong"]), -int(row["places"]), row["capture"]
+    is_complete = row["state"] == "tracked" and not row["truncated"]
+    return 1 + is_complete, -float(row["expected_wrong"]), -int(row["places"]), row["capture"]
 
 
 def _page(rows: Sequence[Mapping[str, Any]]) -> str:
     n, places = len(rows), sum(int(row["places"] or 0) for row in rows)
     failed = sum(row["state"] in _WITHOUT for row in rows)
     changed = sum(row["state"] == "changed" for row in rows)
+    truncated = sum(bool(row["truncated"]) for row in rows)
     lead = f"Captures: {n:,}. Without a result: {failed:,}. "
     lead += f"With a result of another input or settings: {changed:,}. " if changed else ""
+    lead += f"Cut off: {truncated:,}. " if truncated else ""
     lead += f"Places to check in the others: {places:,}."
     titles = (
         "capture", "places to check", "wrong labels expected", "tracks", "named", "labelled",
@@ -231,7 +234,9 @@ def _line(row: Mapping[str, Any]) -> Markup:
     linked = element("a", name, href=quote(target))
     places = int(row["places"])
     kind = "clear" if not places else "some" if places < _MANY else "many"
-    notes = [element("div", row["reason"], class_="note")] if row["reason"] else []
+    notes = [
+        element("div", row[name], class_="note") for name in ("reason", "truncated") if row[name]
+    ]
     share = 100 * int(row["n_labelled"]) / max(int(row["n_detections"]), 1)
     return element(
         "tr",

@@ -95,7 +95,8 @@ def perform(
                 return Outcome(error=f"{job.source}: {error}")
             values: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
             done = Outcome(
-                error=values["error"], warnings=tuple(values["warnings"]),
+                error=values["error"],
+                warnings=tuple(_public(text, job, folder, out) for text in values["warnings"]),
                 seconds=values["seconds"], peak_bytes=values["peak_bytes"],
             )  # fmt: skip
             if done.error:
@@ -121,6 +122,13 @@ def deliver_all(files: Mapping[str, bytes], out: str, *, overwrite: bool) -> Non
     """
     for name, content in files.items():
         deliver(inside(out, name), content, overwrite=overwrite)
+
+
+def _public(text: str, job: Job, folder: Path, out: str) -> str:
+    """Return a message that names the files of a result where they are delivered."""
+    for name in job.files:
+        text = text.replace(str(folder / RESULT / name), inside(out, name))
+    return text
 
 
 def _laid_out(inputs: Mapping[str, bytes], folder: Path) -> dict[str, Path]:
