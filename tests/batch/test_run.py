@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 import asterism as am
+from asterism.batch import find, storage
 from asterism.batch.perform import perform
 from asterism.batch.storage import deliver
 from asterism.cli import main
@@ -296,6 +297,71 @@ def test_a_result_that_another_has_changed_is_kept(captures, out):
     assert path.read_text() == "precious"
     assert am.batch.run([captures], out, workers=1, overwrite=True).n_tracked == 1
     assert path.read_bytes()[:2] == b"\x02\x50"
+
+
+@pytest.fixture
+def others(captures, out):
+    """Files of that folder that are not recognised as captures, in the order of their listing."""
+    first, second = captures / "first", captures / "second"
+    walk = (first / "walk.c3d").read_bytes()
+    (first / "damaged.csv").write_bytes(bytes(range(256)))
+    for name in ("named.csv", "plain", "text.txt", ".hidden.csv"):
+        (first / name).write_bytes(walk)
+    (first / "unused.edits.toml").write_text("")
+    # What the batch uses, and what this program has written, is not listed.
+    edits = [am.model.Edit(kind="clutter", at=((3, 0),))]
+    am.io.write_edits(first / "walk.edits.toml", edits, am.read(first / "walk.c3d"))
+    shutil.copy(first / "markers.toml", second / "other.toml")
+    shutil.copytree(out, captures / "earlier")
+    shutil.copytree(out / "runs" / "first" / "walk.c3d", first / "run")
+    return [
+        str(captures / name)
+        for name in (
+            "first/damaged.csv", "first/named.csv", "second/notes.csv",
+            "first/plain", "first/text.txt", "first/unused.edits.toml",
+        )
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("protocol", ["", "file://"])
+def test_files_that_are_no_captures_are_listed(captures, others, protocol, monkeypatch):
+    if protocol:
+        pytest.importorskip("fsspec", reason="needs the extra cluster")
+    read = []
+
+    def read_bytes(place, n=None):
+        read.append(Path(place).name)
+        return storage.read_bytes(place, n)
+
+    monkeypatch.setattr(find, "read_bytes", read_bytes)
+    sources, sets = [f"{protocol}{captures}"], [f"{protocol}{captures}/second/other.toml"]
+    planned, left_out = find.survey(sources, "out", am.batch.Settings(), markers=sets)
+    assert len(planned) == 4
+    unused = [f"{captures}/first/markers.toml"]  # the given set is used in its place
+    assert sorted(left_out) == sorted(f"{protocol}{each}" for each in others + unused)
+    assert left_out[:3] == [f"{protocol}{each}" for each in others[:3]]
+    # The first bytes are read only of files with the ending of a capture, once each.
+    assert set(read) == {"damaged.csv", "named.csv", "notes.csv", "turn.csv", "summary.json"}
+    assert read.count("damaged.csv") == 1
+
+
+def test_the_command_states_the_files_that_are_no_captures(captures, others, tmp_path, capsys):
+    (captures / "second" / "other.toml").unlink()
+    line = ["batch", str(captures), "-o", str(tmp_path / "new"), "--workers", "1"]
+    for options in (["--dry-run"], []):
+        main([*line, *options, "--json"])
+        assert json.loads(capsys.readouterr().out)["left_out"] == others
+        main([*line, *options])
+        printed = "".join(capsys.readouterr().out.split())  # long paths are folded
+        assert "leftout6,notrecognisedascaptures" in printed
+        assert "first/damaged.csv" in printed
+        assert "and1more" in printed
+        assert "unused.edits.toml" not in printed
+    folder = captures / "nothing"
+    folder.mkdir()
+    (folder / "walk.txt").write_text("walk")
+    assert main(["batch", str(folder), "-o", str(tmp_path / "out")]) == 2
+    assert "no file is recognised as a capture" in capsys.readouterr().err
 
 
 def test_two_captures_with_one_result_are_refused(captures):

@@ -8,8 +8,10 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, Literal, cast
 
+from asterism.batch.index import INDEX, PARQUET, TABLE, holds_batch
 from asterism.batch.job import Job, Settings, key_of
 from asterism.batch.result_file import output_format
+from asterism.batch.run_folder import CONFIG, FILES
 from asterism.batch.storage import (
     files_below,
     files_beside,
@@ -27,7 +29,7 @@ from asterism.records import record
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-__all__ = ["MARKER_SET", "Planned", "captures_below", "plan_batch"]
+__all__ = ["MARKER_SET", "Planned", "captures_below", "first_of", "plan_batch", "survey"]
 
 MARKER_SET = "markers.toml"
 """Name of the marker set of the captures in a folder and below it."""
@@ -35,6 +37,7 @@ _EDITS = ".edits.toml"
 _SURE = (".c3d", ".trc")  # suffixes that only captures have
 _READERS = 8  # captures that are read and hashed at the same time
 _RESULTS = (".tracked", ".corrected")  # before the suffix of a result of this program
+_LISTED = 5  # files that a message names
 
 
 @record
@@ -71,7 +74,7 @@ def plan_batch(
     ----------
     sources : sequence of str
         Captures and folders, by path or URL. In folders, files of the known formats are captures,
-        but for results such as ``trial.tracked.c3d``.
+        but for results such as ``trial.tracked.c3d``. `survey` returns the other files too.
     out : str
         Output folder, by path or URL; captures inside it are left out.
     settings : Settings
@@ -92,10 +95,52 @@ def plan_batch(
     ParameterError
         If no capture is found, or two have the same result.
     """
-    every = (each for source in sources for each in _jobs(source, out, settings, tuple(markers)))
-    found = list({job.source: (job, reason) for job, reason in every}.values())
+    return survey(sources, out, settings, markers=markers, progress=progress)[0]
+
+
+def survey(
+    sources: Sequence[str],
+    out: str,
+    settings: Settings,
+    *,
+    markers: Sequence[str] = (),
+    progress: Callable[[int, int], Any] | None = None,
+) -> tuple[list[Planned], list[str]]:
+    """Find the captures of a batch as `plan_batch`, and the files that are not recognised as such.
+
+    Parameters
+    ----------
+    sources, out, settings, markers, progress
+        As in `plan_batch`.
+
+    Returns
+    -------
+    planned : list of Planned
+        The captures, as of `plan_batch`.
+    left_out : list of str
+        Other files of the folders, by path or URL, those with the ending of a capture first. Hidden
+        files, results of this program, and marker sets and edits of the batch are not among them.
+
+    Raises
+    ------
+    ParameterError
+        As in `plan_batch`.
+    """
+    every: dict[str, tuple[Job, str]] = {}
+    others: set[str] = set()
+    for source in sources:
+        jobs, unknown = _jobs(source, out, settings, tuple(markers))
+        every |= {job.source: (job, reason) for job, reason in jobs}
+        others.update(unknown)
+    found = list(every.values())
+    used = {_absolute(place) for job, _ in found for place in (*job.inputs, *markers)}
+    left_out = [place for place in others if _absolute(place) not in used]
+    left_out.sort(key=lambda place: (not _named(place), place))
     if not found:
-        raise ParameterError("sources", "captures, or folders with captures", ", ".join(sources))
+        got = ", ".join(sources)
+        if left_out:
+            got += f", where no file is recognised as a capture: {', '.join(first_of(left_out))}"
+        raise ParameterError("sources", "captures, or folders with captures", got)
     owners: dict[str, str] = {}
     for job, _ in found:
         for name in (*job.files, job.run):
@@ -112,7 +157,24 @@ def plan_batch(
             planned.append(each)
             if progress is not None:
                 progress(len(planned), len(found))
-    return planned
+    return planned, left_out
+
+
+def first_of(names: Sequence[str]) -> list[str]:
+    """Return the first names for a message, and the number of the others.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names of files or captures.
+
+    Examples
+    --------
+    >>> first_of("abcdefg")
+    ['a', 'b', 'c', 'd', 'e', 'and 2 more']
+    """
+    more = len(names) - _LISTED
+    return [*names[:_LISTED], *([f"and {more:,} more"] if more > 0 else [])]
 
 
 def _examined(job: Job, out: str, reason: str) -> Planned:
@@ -149,34 +211,38 @@ def captures_below(folder: str) -> list[str]:
 
 def _jobs(
     source: str, out: str, settings: Settings, markers: tuple[str, ...]
-) -> Iterator[tuple[Job, str]]:
-    """Iterate over the captures of one source, each with the reason why it cannot be read."""
+) -> tuple[list[tuple[Job, str]], list[str]]:
+    """Return the captures of one source, each with the reason why it cannot be read.
+
+    The other files of a folder follow, without the results of this program.
+    """
+    others: list[str] = []
+    reasons: dict[str, str] = {}
     if is_file(source):
         folder, name = split(source)
-        names, listed = {name: ""}, files_beside(source)
+        formats, listed = {name: _formats(folder, name)}, files_beside(source)
     else:
         folder = source
         every = dict(each for each in files_below(folder) if not _is_in(folder, each[0], out))
-        listed = {name for name, reason in every.items() if not reason}
-        names = {
-            name: reason
-            for name, reason in every.items()
-            if reason or (_formats(folder, name) and not _is_result(name))
-        }
-    for name in sorted(names):
+        reasons = {name: reason for name, reason in every.items() if reason}
+        listed = every.keys() - reasons.keys()
+        examined = {name: _formats(folder, name) for name in listed - _written(folder, listed)}
+        formats = {name: known for name, known in examined.items() if known}
+        others = [inside(folder, name) for name in examined.keys() - formats.keys()]
+    jobs: list[tuple[Job, str]] = []
+    for name in sorted(formats.keys() | reasons.keys()):
         sets = markers or tuple(inside(folder, each) for each in _sets_of(name, listed))
         stem = PurePosixPath(name).with_suffix("")
         edits = f"{stem}{_EDITS}"
-        of_input = next(iter(_formats(folder, name)), "c3d")
+        of_input = next(iter(formats.get(name, ())), "c3d")
         format = settings.format or output_format(None, None, of_input)
-        yield (
-            Job(
-                source=inside(folder, name), name=name,
-                output=f"{stem}.tracked{_suffix(name, format)}", format=format, settings=settings,
-                markers=sets, edits=inside(folder, edits) if edits in listed else None,
-            ),
-            names[name],
+        job = Job(
+            source=inside(folder, name), name=name,
+            output=f"{stem}.tracked{_suffix(name, format)}", format=format, settings=settings,
+            markers=sets, edits=inside(folder, edits) if edits in listed else None,
         )  # fmt: skip
+        jobs.append((job, reasons.get(name, "")))
+    return jobs, others
 
 
 def _is_in(folder: str, name: str, out: str) -> bool:
@@ -189,6 +255,18 @@ def _is_in(folder: str, name: str, out: str) -> bool:
     return Path(place).resolve().is_relative_to(Path(out).resolve())
 
 
+def _written(folder: str, listed: set[str]) -> set[str]:
+    """Return the files that this program wrote: results, run folders, indices of batches."""
+    written = {name for name in listed if _is_result(name)}
+    for name in listed:
+        path = PurePosixPath(name)
+        if path.name == CONFIG:
+            written.update(str(path.parent / each) for each in FILES)
+        elif path.name == TABLE and holds_batch(inside(folder, str(path.parent))):
+            written.update(str(path.parent / each) for each in (INDEX, TABLE, PARQUET))
+    return written
+
+
 def _is_result(name: str) -> bool:
     return PurePosixPath(PurePosixPath(name).stem).suffix in _RESULTS
 
@@ -198,15 +276,24 @@ def _formats(folder: str, name: str) -> list[str]:
 
     A file that cannot be read has the formats of its suffix, so that it is reported later.
     """
-    suffix = PurePosixPath(name).suffix.lower()
-    named = [f.name for f in CAPTURE_FORMATS.values() if suffix and suffix in f.extensions]
-    if suffix in _SURE or not named:
+    named = _named(name)
+    if name.lower().endswith(_SURE) or not named:
         return named
     try:
         head = read_bytes(inside(folder, name), HEAD)
     except FormatError:
         return named
     return [f.name for f in fitting_formats(head) if f.name in named]
+
+
+def _named(name: str) -> list[str]:
+    """Return the formats whose files have the ending of a name."""
+    suffix = PurePosixPath(name).suffix.lower()
+    return [f.name for f in CAPTURE_FORMATS.values() if suffix and suffix in f.extensions]
+
+
+def _absolute(place: str) -> str:
+    return place if is_url(place) else str(Path(place).absolute())
 
 
 def _sets_of(name: str, listed: set[str]) -> Iterator[str]:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from asterism.batch.job import Job
 
-__all__ = ["INDEX", "TABLE", "holds_batch", "write_index"]
+__all__ = ["INDEX", "PARQUET", "TABLE", "holds_batch", "write_index"]
 
 INDEX, TABLE, PARQUET = "index.html", "summary.csv", "summary.parquet"
 _COLUMNS = (

@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from asterism.batch.find import plan_batch
+from asterism.batch.find import survey
 from asterism.batch.index import holds_batch, write_index
 from asterism.batch.job import Settings
 from asterism.batch.perform import Outcome, deliver_all, perform
@@ -44,11 +44,14 @@ class Batch:
         Captures, with their state before the batch.
     outcomes : dict of Outcome
         Outcomes of this run by the name of the capture; results of earlier runs have none.
+    left_out : tuple of str
+        Other files of the folders, which are not recognised as captures.
     """
 
     out: str
     planned: tuple[Planned, ...]
     outcomes: dict[str, Outcome]
+    left_out: tuple[str, ...] = ()
 
     @property
     def failed(self) -> dict[str, str]:
@@ -176,7 +179,7 @@ def run(
     place = str(out)
     if not is_url(place):
         check_folder(place, "a batch", allowed=overwrite or holds_batch(place))
-    planned = plan_batch(
+    planned, left_out = survey(
         [str(source) for source in sources], place, settings, markers=[str(m) for m in markers],
         progress=None if progress is None else lambda n, of: progress("", "examining", n, of),
     )  # fmt: skip
@@ -184,7 +187,7 @@ def run(
     outcomes = {
         each.job.name: Outcome(error=each.reason) for each in planned if each.state == "failed"
     }
-    batch = Batch(out=place, planned=tuple(planned), outcomes=outcomes)
+    batch = Batch(out=place, planned=tuple(planned), outcomes=outcomes, left_out=tuple(left_out))
     write_index(place, jobs, batch.failed, batch.changed, parquet=parquet, overwrite=overwrite)
     todo: dict[str, Job] = {}
     for each in planned:

@@ -11,13 +11,11 @@ import typer
 from asterism.cli.console import Json, Overwrite, Quiet, console, print_json, print_table
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterable, Sequence
+    from collections.abc import Callable, Generator, Sequence
 
     import asterism as am
 
 __all__ = ["batch"]
-
-_LISTED = 5  # names of captures or files that are printed
 
 _In = Annotated[
     list[str], typer.Argument(metavar="IN", help="Captures and folders, by path or URL.")
@@ -107,6 +105,7 @@ def batch(
         asterism batch captures -o tracked --scheduler tcp://node1:8786
     """
     import asterism as am
+    from asterism.batch.find import survey
     from asterism.batch.index import holds_batch
     from asterism.batch.storage import is_url
     from asterism.checks import check_number
@@ -128,8 +127,8 @@ def batch(
         seed=seed, fill=fill, report=not no_report, format=format,
     )  # fmt: skip
     if dry_run:
-        planned = am.batch.plan_batch(sources, out, settings, markers=markers or [])
-        _print_plan(planned, quiet=quiet, json=json)
+        planned, left_out = survey(sources, out, settings, markers=markers or [])
+        _print_plan(planned, left_out, quiet=quiet, json=json)
         return
     with _shown() as show:
         done = am.batch.run(
@@ -141,6 +140,7 @@ def batch(
         values = {
             "output": out, "n_captures": len(done.planned), "n_tracked": done.n_tracked,
             "n_done_before": done.n_done_before, "changed": done.changed, "failed": done.failed,
+            "left_out": list(done.left_out),
         }  # fmt: skip
         print_json(values)
     elif not quiet:
@@ -178,7 +178,9 @@ def _shown() -> Generator[Callable[[str, str, int, int], None], None, None]:
         yield show
 
 
-def _print_plan(planned: Sequence[am.batch.Planned], *, quiet: bool, json: bool) -> None:
+def _print_plan(
+    planned: Sequence[am.batch.Planned], left_out: Sequence[str], *, quiet: bool, json: bool
+) -> None:
     if json:
         rows = [
             {
@@ -191,7 +193,7 @@ def _print_plan(planned: Sequence[am.batch.Planned], *, quiet: bool, json: bool)
             }
             for each in planned
         ]
-        print_json({"captures": rows})
+        print_json({"captures": rows, "left_out": left_out})
     elif not quiet:
         header = ("capture", "state", "result", "markers", "edits")
         table = [
@@ -202,16 +204,22 @@ def _print_plan(planned: Sequence[am.batch.Planned], *, quiet: bool, json: bool)
             for each in planned
         ]  # fmt: skip
         print_table(table, header)
+        if left_out:
+            print_table(_left_out(left_out))
 
 
-def _short(names: Iterable[str]) -> list[str]:
-    """Return the first names, and the number of the others."""
-    names = list(names)
-    more = len(names) - _LISTED
-    return [*names[:_LISTED], *([f"and {more:,} more"] if more > 0 else [])]
+def _left_out(files: Sequence[str]) -> list[tuple[str, str]]:
+    """Return the files that are not recognised as captures as rows of a printed table."""
+    from asterism.batch.find import first_of
+
+    if not files:
+        return []
+    rows = [("left out", f"{len(files):,}, not recognised as captures")]
+    return rows + [("", name) for name in first_of(files)]
 
 
 def _print(done: am.batch.Batch) -> None:
+    from asterism.batch.find import first_of
     from asterism.batch.index import INDEX
     from asterism.batch.storage import inside
 
@@ -221,10 +229,11 @@ def _print(done: am.batch.Batch) -> None:
         rows.append(
             ("changed", f"{len(done.changed)}, of another input, settings or versions: kept")
         )
-        rows += [("", line) for line in _short(done.changed)]
+        rows += [("", line) for line in first_of(list(done.changed))]
         rows.append(("", "Give --overwrite to track them again, or another --out to keep both."))
     rows += [("failed", len(done.failed))] if done.failed else []
     rows += [("", reason) for reason in done.failed.values()]
+    rows += _left_out(done.left_out)
     took = [each for each in done.outcomes.values() if not each.error]
     if took:
         slowest = max(each.seconds for each in took)
