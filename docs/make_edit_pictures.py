@@ -27,7 +27,7 @@ def photograph(page: Page, name: str) -> None:
     page.settle()
     page.settle()
     picture = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
-    picture.save(IMAGES / f"edit_{name}.png", optimize=True)
+    picture.quantize(256).save(IMAGES / f"edit_{name}.png", optimize=True)
 
 
 def session(browser: Browser, address: str) -> None:
