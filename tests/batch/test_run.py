@@ -364,6 +364,23 @@ def test_the_command_states_the_files_that_are_no_captures(captures, others, tmp
     assert "no file is recognised as a capture" in capsys.readouterr().err
 
 
+def test_the_output_is_another_folder_than_the_input(captures, capsys):
+    before = contents(captures)
+    for source, out in ((captures, captures), (captures / "first", captures)):
+        for options in ([], ["--dry-run"], ["--overwrite"]):
+            assert main(["batch", str(source), "-o", str(out), *options]) == 2
+            said = "".join(capsys.readouterr().err.split())
+            assert "out:expectedanotherfolderthantheinput" in said
+    assert contents(captures) == before
+    # A pattern such as captures/* matches an output folder in it too.
+    places = [str(captures / "first"), str(captures / "out")]
+    (captures / "out").mkdir()
+    assert len(am.batch.plan_batch(places, places[1], am.batch.Settings())) == 2
+    pytest.importorskip("fsspec", reason="needs the extra cluster")
+    with pytest.raises(ParameterError, match="another folder than the input"):
+        am.batch.run([f"file://{captures}/"], f"file://{captures}")
+
+
 def test_two_captures_with_one_result_are_refused(captures):
     places = [str(captures / "first" / "walk.c3d"), str(captures / "second" / "walk.c3d")]
     with pytest.raises(ParameterError, match="the result of both"):

@@ -29,7 +29,9 @@ from asterism.records import record
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-__all__ = ["MARKER_SET", "Planned", "captures_below", "first_of", "plan_batch", "survey"]
+__all__ = [
+    "MARKER_SET", "Planned", "captures_below", "check_apart", "first_of", "plan_batch", "survey",
+]  # fmt: skip
 
 MARKER_SET = "markers.toml"
 """Name of the marker set of the captures in a folder and below it."""
@@ -93,7 +95,8 @@ def plan_batch(
     Raises
     ------
     ParameterError
-        If no capture is found, or two have the same result.
+        If no capture is found, all sources are in the output folder, or two captures have the same
+        result.
     """
     return survey(sources, out, settings, markers=markers, progress=progress)[0]
 
@@ -126,6 +129,7 @@ def survey(
     ParameterError
         As in `plan_batch`.
     """
+    check_apart(sources, out)
     every: dict[str, tuple[Job, str]] = {}
     others: set[str] = set()
     for source in sources:
@@ -158,6 +162,28 @@ def survey(
             if progress is not None:
                 progress(len(planned), len(found))
     return planned, left_out
+
+
+def check_apart(sources: Sequence[str], out: str) -> None:
+    """Raise if all sources are folders in the output folder, whose captures are left out.
+
+    Parameters
+    ----------
+    sources : sequence of str
+        Captures and folders, by path or URL.
+    out : str
+        Output folder, by path or URL.
+
+    Raises
+    ------
+    ParameterError
+        If they are, or the first of them does not exist.
+    """
+    if sources and all(_is_in(source, out) and not is_file(source) for source in sources):
+        raise ParameterError(
+            "out", "another folder than the input, and none that holds it", out,
+            "give a new folder, beside the input or inside it",
+        )  # fmt: skip
 
 
 def first_of(names: Sequence[str]) -> list[str]:
@@ -223,7 +249,9 @@ def _jobs(
         formats, listed = {name: _formats(folder, name)}, files_beside(source)
     else:
         folder = source
-        every = dict(each for each in files_below(folder) if not _is_in(folder, each[0], out))
+        every = dict(
+            each for each in files_below(folder) if not _is_in(inside(folder, each[0]), out)
+        )
         reasons = {name: reason for name, reason in every.items() if reason}
         listed = every.keys() - reasons.keys()
         examined = {name: _formats(folder, name) for name in listed - _written(folder, listed)}
@@ -245,13 +273,12 @@ def _jobs(
     return jobs, others
 
 
-def _is_in(folder: str, name: str, out: str) -> bool:
-    """Return whether a file of a folder is in the output folder."""
-    if is_url(folder) != is_url(out):
+def _is_in(place: str, out: str) -> bool:
+    """Return whether a file or folder is the output folder or in it."""
+    if is_url(place) != is_url(out):
         return False
-    place = inside(folder, name)
     if is_url(out):
-        return place.startswith(f"{out.rstrip('/')}/")
+        return f"{place.rstrip('/')}/".startswith(f"{out.rstrip('/')}/")
     return Path(place).resolve().is_relative_to(Path(out).resolve())
 
 

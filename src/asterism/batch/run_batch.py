@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from asterism.batch.find import survey
+from asterism.batch.find import check_apart, survey
 from asterism.batch.index import holds_batch, write_index
 from asterism.batch.job import Settings
 from asterism.batch.perform import Outcome, deliver_all, perform
@@ -176,11 +176,12 @@ def run(
         raise ParameterError("send", "a scheduler, to whose workers captures are sent", "none")
     if memory is None and scheduler is None:
         memory = _memory_of_machine(workers)
-    place = str(out)
+    place, captures = str(out), [str(source) for source in sources]
+    check_apart(captures, place)
     if not is_url(place):
         check_folder(place, "a batch", allowed=overwrite or holds_batch(place))
     planned, left_out = survey(
-        [str(source) for source in sources], place, settings, markers=[str(m) for m in markers],
+        captures, place, settings, markers=[str(m) for m in markers],
         progress=None if progress is None else lambda n, of: progress("", "examining", n, of),
     )  # fmt: skip
     jobs = [each.job for each in planned]

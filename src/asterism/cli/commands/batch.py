@@ -105,7 +105,7 @@ def batch(
         asterism batch captures -o tracked --scheduler tcp://node1:8786
     """
     import asterism as am
-    from asterism.batch.find import survey
+    from asterism.batch.find import check_apart, survey
     from asterism.batch.index import holds_batch
     from asterism.batch.storage import is_url
     from asterism.checks import check_number
@@ -115,6 +115,7 @@ def batch(
 
     if memory is not None:
         check_number("--memory", memory, above=0)
+    check_apart(sources, out)
     if not (dry_run or is_url(out)):
         folder = Folder(Path(out))
         check_outputs({"--out": folder}, [], overwrite=overwrite or holds_batch(out))
