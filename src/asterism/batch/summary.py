@@ -38,6 +38,8 @@ class Summary:
         Number of gaps in tracks.
     longest_gaps : tuple of am.model.Gap
         Longest gaps, at most three.
+    gap_names : tuple of str or None
+        Marker name of the track of each of these gaps; None without one.
     seconds, frames_per_second : float
         Running time of the method, and frames per second.
     log_posterior : float or None
@@ -72,6 +74,7 @@ class Summary:
     n_clutter: int
     n_gaps: int
     longest_gaps: tuple[am.model.Gap, ...]
+    gap_names: tuple[str | None, ...]
     seconds: float
     frames_per_second: float
     log_posterior: float | None
@@ -87,8 +90,9 @@ class Summary:
     def rows(self) -> list[tuple[str, str]]:
         """Return the figures as rows of the printed table."""
         gaps = [
-            f"track {g.track}, frames {g.first} to {g.last} ({g.seconds:.3g} s)"
-            for g in self.longest_gaps
+            f"{name or f'track {g.track}'}, frames {g.first} to {g.last} ({g.length} "
+            f"frame{'s' * (g.length > 1)}, {g.seconds:.3g} s between detections)"
+            for g, name in zip(self.longest_gaps, self.gap_names, strict=True)
         ]
         share = 100 * self.n_labelled / max(self.n_detections, 1)
         return [
@@ -147,6 +151,8 @@ class Summary:
         """Return the figures as plain values."""
         values = dataclasses.asdict(self)
         del values["named"]  # the same as `naming`, as it is printed
+        for gap, name in zip(values["longest_gaps"], values.pop("gap_names"), strict=True):
+            gap["name"] = name
         return values
 
 
@@ -203,6 +209,7 @@ def summarize(result: am.tracking.Tracked, *, out: Path, method: str, seconds: f
             dataclasses.replace(gap, first=d.first_frame + gap.first, last=d.first_frame + gap.last)
             for gap in longest
         ),
+        gap_names=tuple(tracks.names[gap.track] for gap in longest),
         seconds=seconds,
         frames_per_second=d.n_frames / seconds if seconds else 0.0,
         log_posterior=log_posterior if math.isfinite(log_posterior) else None,
