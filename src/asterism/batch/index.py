@@ -12,7 +12,7 @@ from urllib.parse import quote
 
 from asterism.batch.storage import deliver, inside, read_bytes
 from asterism.errors import FormatError
-from asterism.reporting.page.markup import Markup, element
+from asterism.reporting.page.markup import Markup, element, joined
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -44,7 +44,7 @@ _STYLE = (
     "tbody th{min-width:24ch;font-weight:600;overflow-wrap:anywhere;white-space:normal}"
     "td.why{text-align:left;white-space:normal;overflow-wrap:anywhere}"
     "a{color:var(--accent)}.clear{color:var(--clear)}.some{color:var(--some)}"
-    ".many{color:var(--many);font-weight:600}.note{color:var(--many);font-weight:400}"
+    ".many{color:var(--many);font-weight:600}td.note{color:var(--many);border-top:0;padding-top:0}"
 )
 _FIRST = b"capture,state,reason,"  # of a table of a batch
 _WITHOUT = ("failed", "not tracked")  # states of captures without a result
@@ -221,7 +221,7 @@ def _page(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _line(row: Mapping[str, Any]) -> Markup:
-    """Return the row of one capture."""
+    """Return the row of one capture, with a row for each note below it."""
     name = element("bdi", row["capture"])
     if row["state"] in _WITHOUT:
         why = row["reason"] or "not tracked yet"
@@ -235,12 +235,14 @@ def _line(row: Mapping[str, Any]) -> Markup:
     places = int(row["places"])
     kind = "clear" if not places else "some" if places < _MANY else "many"
     notes = [
-        element("div", row[name], class_="note") for name in ("reason", "truncated") if row[name]
+        element("tr", element("td", row[name], colspan=8, class_="why note"))
+        for name in ("reason", "truncated")
+        if row[name]
     ]
     share = 100 * int(row["n_labelled"]) / max(int(row["n_detections"]), 1)
-    return element(
+    figures = element(
         "tr",
-        element("th", linked, *notes, scope="row"),
+        element("th", linked, scope="row"),
         element("td", element("span", f"{places:,}", class_=kind)),
         element("td", f"{float(row['expected_wrong']):,.0f}"),
         element("td", f"{row['n_tracks']:,}"),
@@ -249,3 +251,4 @@ def _line(row: Mapping[str, Any]) -> Markup:
         element("td", f"{row['n_gaps']:,}"),
         element("td", f"{row['n_frames']:,}"),
     )
+    return joined(figures, *notes)
