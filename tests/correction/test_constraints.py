@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 import asterism as am
@@ -68,6 +70,18 @@ def test_two_names_are_two_markers(d):
 def test_contradictions_name_both_statements(edits, d):
     with pytest.raises(am.ParameterError, match="which contradicts"):
         Constraints.of(edits, d)
+
+
+def test_frames_of_a_capture_are_those_of_its_file(d, tmp_path):
+    am.write(d, tmp_path / "walk.csv")
+    read = am.read(tmp_path / "walk.csv")
+    capture = replace(read, first_frame=107)
+    with pytest.raises(am.ParameterError) as error:
+        Constraints.of([name((2, 1), "LASI"), name((2, 1), "RASI")], capture)
+    text = str(error.value)
+    assert "name RASI: frame 2 point 1 (frame 109 of the file), which contradicts name LASI" in text
+    with pytest.raises(am.ParameterError, match=r"frame 2 point 99 \(frame 109 of the file\)"):
+        Constraints.of([name((2, 99), "LASI")], capture)
 
 
 def test_a_contradiction_changes_nothing(d):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 
@@ -11,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import asterism as am
 from asterism.errors import ParameterError
 from asterism.metrics import align, evaluate, oracle_tracks
 from asterism.metrics.matching import same_detections
@@ -260,6 +262,22 @@ def test_result_reads_as_text_json_and_table():
     assert f"{found.switches} (" in text
     assert len({line.index("  ") for line in text.splitlines()}) > 1
     assert repr(found).startswith("Evaluation(idf1=")
+
+
+def test_filled_points_are_no_detections():
+    seen = am.simulate.corrupt(am.simulate.person(frames=80, seed=2), missing=0.1, seed=2)
+    tracks = am.track(seen.detections)
+    filled = am.fill_gaps(tracks).tracks
+    assert filled.detections.filled.sum() > 100
+    expected, found = evaluate(tracks, seen), evaluate(filled, seen)
+    assert found.filled == filled.detections.filled.sum()
+    assert str(found.to_dict()) == str(expected.to_dict() | {"filled": found.filled})  # with NaN
+    assert re.search(rf"filled points left out +{found.filled}\n", str(found))
+    assert "filled" not in str(expected)
+    # The truth may be filled too, and have true positions.
+    places = filled.detections.points
+    both = evaluate(filled, filled, truth_positions=places)
+    assert (both.idf1, both.motp_mm) == (1.0, 0.0)
 
 
 def test_alignment_says_which_is_which():

@@ -106,7 +106,8 @@ class Receiver:
         try:
             return self._source.receive(timeout)
         except SourceLost as lost:
-            self._faults.add("disconnects", f"{lost} It is connected again when it can")
+            text = str(lost).removeprefix(f"{self._source.name}: ")
+            self._faults.add("disconnects", f"{text} It is connected again when it can")
             self._opening = threading.Thread(target=self._open_again, name="opening", daemon=True)
             self._opening.start()
             return None

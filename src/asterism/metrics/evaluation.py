@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.checks import check_array
+from asterism.checks import check_array, check_kind
 from asterism.metrics.alignment import align
 from asterism.metrics.association import AssociationScores, association_scores
 from asterism.metrics.clear import ClearScores, clear_scores
@@ -15,12 +15,11 @@ from asterism.metrics.gospa import GospaScores, gospa_scores
 from asterism.metrics.hota import HotaScores, hota_scores
 from asterism.metrics.identity import IdentityScores, identity_scores
 from asterism.metrics.names import NameScores, name_scores
+from asterism.model import Tracks
 from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
-
-    from asterism.model import Tracks
 
 __all__ = ["Evaluation", "evaluate"]
 
@@ -35,6 +34,8 @@ class Evaluation(
     ----------
     times : ndarray of shape (T,)
         Times of the frames, seconds, for all fields that start with ``frame_``.
+    filled : int
+        Number of filled points of the tracks, which are left out.
 
     Examples
     --------
@@ -45,6 +46,7 @@ class Evaluation(
     """
 
     times: NDArray[np.float64]
+    filled: int
 
     def to_dict(self) -> dict[str, Any]:
         """Return the overall scores by name, as plain numbers for JSON.
@@ -89,13 +91,14 @@ class Evaluation(
             ("fragments", f"{self.fragments}"),
             ("missed, false labels", f"{self.missed}, {self.false_labels}"),
             ("mostly tracked, lost", f"{self.mostly_tracked}, {self.mostly_lost}"),
-            ("wrong associations", f"{self.wrong_percent:.3f} %"),
-            ("… by a track's first marker", f"{self.wrong_first_percent:.3f} %"),
-            ("missing labels", f"{self.missing_percent:.3f} %"),
+            ("wrong associations", _percent(self.wrong_percent)),
+            ("… by a track's first marker", _percent(self.wrong_first_percent)),
+            ("missing labels", _percent(self.missing_percent)),
             ("clutter labelled", _percent(self.clutter_labelled_percent)),
             ("tracks a marker", f"{self.tracks_per_marker:.3f}"),
             ("wrong links, broken links", f"{self.wrong_links}, {self.broken_links}"),
             ("frames by wrong ones", table),
+            *([("filled points left out", str(self.filled))] if self.filled else []),
             *self._name_rows(),
         ]
         width = max(len(name) for name, _ in rows)
@@ -136,6 +139,7 @@ def evaluate(
     not share one `Detections`, detections are matched by equal times and positions
     (`asterism.metrics.align`). If any track of the truth has a name, its unnamed tracks are
     clutter. Names are scored if both sides have any; all other scores compare identities alone.
+    Filled points of either side are left out: they are no detections.
 
     Parameters
     ----------
@@ -172,15 +176,19 @@ def evaluate(
     >>> evaluate(oracle_tracks(truth, max_gap=2), truth)
     Evaluation(idf1=0.8235, mota=0.9412, hota=0.8935, switches=1, n_tracks=3, n_markers=2)
     """
+    check_kind("tracks", tracks, Tracks, "am.track(detections)")
+    check_kind("truth", truth, Tracks, "am.io.read_tracks(path)")
+    filled, of_truth = tracks.detections.filled, truth.detections.filled
+    tracks, truth = tracks.measured(), truth.measured()
     both = align(tracks, truth, tolerance=tolerance)
     labels, truth_labels, frame_of = both.labels, both.truth_labels, both.frame_of
     n_frames = len(both.times)
     error = None
     if truth_positions is not None:
-        d = truth.detections
-        places = check_array(
-            "truth_positions", truth_positions, (d.n_points, d.n_axes), finite=False
-        )
+        n_axes = truth.detections.n_axes
+        n = len(truth.labels) if of_truth is None else len(of_truth)
+        places = check_array("truth_positions", truth_positions, (n, n_axes), finite=False)
+        places = places if of_truth is None else places[~of_truth]
         error = np.full(len(labels), np.nan)
         is_on_both = (both.i_tracks >= 0) & (both.i_truth >= 0)
         seen = tracks.detections.points[both.i_tracks[is_on_both]]
@@ -196,7 +204,8 @@ def evaluate(
     scores: dict[str, Any] = {}
     for part in parts:
         scores |= vars(part)
-    return Evaluation(times=both.times, **scores)
+    n_filled = 0 if filled is None else int(filled.sum())
+    return Evaluation(times=both.times, filled=n_filled, **scores)
 
 
 def _percent(share: float) -> str:

@@ -112,8 +112,11 @@ def edit(
         out = source.with_name(f"{source.stem}.corrected{ending}")
     output_format(out, None)
     inputs = [source, script, *(markers or [])]
-    check_outputs({"--out": out}, inputs, overwrite=overwrite)
     path = edits or script or source.with_name(f"{source.stem}.edits.toml")
+    if script is None and path.is_file() and out.is_file() and not overwrite:
+        hint = f"give --overwrite to go on with the edits in {path} and to save there again"
+        raise ParameterError("--out", "a new file", str(out), hint)
+    check_outputs({"--out": out}, inputs, overwrite=overwrite)
     if script is not None and not script.is_file():
         raise ParameterError("--script", "a file of edits", f"{script}, which does not exist")
     if edits is not None:

@@ -209,8 +209,6 @@ def _truth(
     tracks = am.io.read_tracks(path)
     capture = tracks.detections
     assert isinstance(capture, am.Capture)
-    for warning in capture.warnings:
-        log.warning("%s: %s", path, warning)
     n_clutter = int((tracks.labels < 0).sum())
     if n_clutter and tracks.n_tracks:
         log.warning("%s: %d points without a track are not filmed", path, n_clutter)

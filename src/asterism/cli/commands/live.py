@@ -145,7 +145,10 @@ def _print_address(address: str) -> None:
 
 
 def _rows(run: am.live.LiveRun) -> list[tuple[str, str]]:
+    from asterism.live.loop import FIRST_SECONDS
+
     info = run.info
+    no_model = f"none: estimated from the first {FIRST_SECONDS:g} s; a shorter stream needs --model"
     latency = ", ".join(
         f"{name} {1e3 * info[f'latency_{key}']:.3g} ms"
         for key, name in (("median", "median"), ("p99", "99 %"), ("p999", "99.9 %"))
@@ -153,6 +156,7 @@ def _rows(run: am.live.LiveRun) -> list[tuple[str, str]]:
     return [
         ("frames", f"{run.n_frames:,} at {run.rate:.4g} Hz"),
         ("tracks", f"{run.n_tracks}, {run.n_names} with a name"),
+        *([] if run.n_models else [("model", no_model)]),
         ("latency", latency if run.n_frames else "–"),
         *((kind, f"{n:,}") for kind, n in (run.faults or {}).items()),
     ]

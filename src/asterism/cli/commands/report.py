@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from asterism.checks import check_file
 from asterism.cli.console import Json, Overwrite, Quiet, print_json, print_table, progress
 from asterism.errors import ParameterError
 
@@ -68,6 +69,8 @@ def report(
         raise ParameterError(", ".join(given), "one capture", f"{len(sources)}")
     pages = [source.with_suffix(".html") if out is None else out for source in sources]
     check_ending("--out", out, ".html", ".htm")
+    for source in sources:
+        check_file(source)
     written = {"--out": pages[0]} if len(pages) == 1 else {f"--out ({p})": p for p in pages}
     check_outputs(written, [*sources, truth, rig], overwrite=overwrite)
     true = None if truth is None else am.io.read_tracks(truth)

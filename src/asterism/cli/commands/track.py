@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import logging
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
     from asterism.cli.outputs import Folder
     from asterism.model import Recipe
 
-log = logging.getLogger(__name__)
 
 _In = Annotated[Path | None, typer.Argument(metavar="IN", help="Capture to track.")]
 _Out = Annotated[
@@ -155,6 +153,7 @@ def track(
     from asterism.batch.run_folder import Run
     from asterism.cli.outputs import check_ending, check_outputs, read_model
     from asterism.io.captures.files import format_of
+    from asterism.io.captures.rates import fixed_rate
     from asterism.tracking.naming.from_file import read_markers
 
     check_ending("--report", report, ".html", ".htm")
@@ -182,6 +181,9 @@ def track(
     check_number("--seed", seed or 0, above=0, closed=True, integer=True)
     given = None if model is None else read_model(model)
     capture = am.read(source)
+    written = am.io.CAPTURE_FORMATS[chosen_format]
+    if written.has_fixed_rate:
+        fixed_rate(capture, written.extensions[0][1:].upper())
     stated = [edit for path in edits or [] for edit in am.io.read_edits(path, capture)]
     if job is not None:
         assert repeat is not None
@@ -219,7 +221,8 @@ def track(
     if prints:
         if result.recipe.method != recipe.method:
             print_table([("method", result.recipe.chosen)])
-        rows = summary.rows() + ([("report", str(report))] if report is not None else [])
+        rows = [*([("edits", f"{len(stated)} respected")] if stated else []), *summary.rows()]
+        rows += [("report", str(report))] if report is not None else []
         print_table(rows, title=f"\nTracked with {result.recipe.method}")
     if json:
         page = {} if report is None else {"report": str(report)}
@@ -324,5 +327,3 @@ def _print_capture(capture: am.Capture) -> None:
     print_table(
         [(capture.path, f"{capture.n_frames} frames, {capture.n_points} points, {rate:g} Hz")]
     )
-    for warning in capture.warnings:
-        log.warning("%s: %s", capture.path, warning)

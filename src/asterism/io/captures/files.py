@@ -50,6 +50,7 @@ def read(path: str | Path, *, format: str | None = None) -> Capture:
     Capture
         Detections in metres with the identities and the axes of the file. Of a truncated C3D the
         complete frames are read; `Capture.truncated` and a log message report the missing part.
+        `Capture.warnings` are logged too.
 
     Raises
     ------
@@ -73,7 +74,7 @@ def read(path: str | Path, *, format: str | None = None) -> Capture:
     path = check_path("path", path)
     asked = None if format is None else _named(format)
     with _about(path):
-        return _log_truncation(_find(path, asked).read(path))
+        return _log_warnings(_find(path, asked).read(path))
 
 
 def read_tracks(path: str | Path, *, format: str | None = None) -> Tracks:
@@ -109,7 +110,7 @@ def read_tracks(path: str | Path, *, format: str | None = None) -> Tracks:
     with _about(path):
         chosen = _find(path, asked)
         if chosen.read_tracks is None:
-            return _log_truncation(chosen.read(path)).tracks
+            return _log_warnings(chosen.read(path)).tracks
         return chosen.read_tracks(path)
 
 
@@ -176,10 +177,10 @@ def write(
         log.warning("%s: holds the complete frames of a truncated capture, %s", path, source.path)
 
 
-def _log_truncation(capture: Capture) -> Capture:
-    """Log a warning if frames of the file are missing, and return the capture."""
-    if capture.truncated:
-        log.warning("%s: %s", capture.path, capture.truncated)
+def _log_warnings(capture: Capture) -> Capture:
+    """Log what is odd in the file, and whether frames are missing, and return the capture."""
+    for warning in (*capture.warnings, *filter(None, [capture.truncated])):
+        log.warning("%s: %s", capture.path, warning)
     return capture
 
 

@@ -47,6 +47,8 @@ class CaptureFormat:
         Function from a path to `Tracks`, for a format that holds more than a `Capture`.
     keeps_filled : bool
         Whether the format marks filled points.
+    has_fixed_rate : bool
+        Whether it holds only 3-D points at a fixed rate (`fixed_rate`).
 
     Examples
     --------
@@ -63,6 +65,7 @@ class CaptureFormat:
     write: Callable[[Tracks, IO[bytes]], None] | None = None
     read_tracks: Callable[[Path], Tracks] | None = None
     keeps_filled: bool = False
+    has_fixed_rate: bool = False
 
 
 CAPTURE_FORMATS: dict[str, CaptureFormat] = Registry(
@@ -76,6 +79,7 @@ CAPTURE_FORMATS: dict[str, CaptureFormat] = Registry(
             read=c3d.read,
             write=c3d_write.write,
             keeps_filled=True,
+            has_fixed_rate=True,
         ),
         CaptureFormat(
             name="trc",
@@ -84,6 +88,7 @@ CAPTURE_FORMATS: dict[str, CaptureFormat] = Registry(
             sniff=trc.sniff,
             read=trc.read,
             write=trc.write,
+            has_fixed_rate=True,
         ),
         CaptureFormat(
             name="csv",
@@ -117,6 +122,7 @@ CAPTURE_FORMATS: dict[str, CaptureFormat] = Registry(
             sniff=qtm_tsv.sniff,
             read=qtm_tsv.read,
             write=qtm_tsv.write,
+            has_fixed_rate=True,
         ),
         CaptureFormat(
             name="pointcloud",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from asterism.errors import ParameterError
+from asterism.model import Capture
 from asterism.model.edit import REASSIGN
 
 if TYPE_CHECKING:
@@ -12,7 +13,7 @@ if TYPE_CHECKING:
 
     from asterism.model import Detections, Edit
 
-__all__ = ["Constraints", "detections_of"]
+__all__ = ["Constraints", "detections_of", "in_words"]
 
 
 def detections_of(edit: Edit, detections: Detections) -> tuple[int, ...]:
@@ -34,9 +35,18 @@ def detections_of(edit: Edit, detections: Detections) -> tuple[int, ...]:
     for frame, point in edit.at:
         if frame >= detections.n_frames or point >= detections.counts[frame]:
             expected = f"a detection of {detections.n_frames} frames"
-            raise ParameterError("edits", expected, f"frame {frame}, point {point}")
+            raise ParameterError("edits", expected, in_words(edit, detections))
         found.append(int(detections.offsets[frame]) + point)
     return tuple(found)
+
+
+def in_words(edit: Edit, detections: Detections) -> str:
+    """Return an edit in words; the frames of a capture also as its file numbers them."""
+    words = repr(edit)[5:-1]
+    if not edit.at or not isinstance(detections, Capture):
+        return words
+    frames = ", ".join(str(detections.first_frame + frame) for frame, _ in edit.at)
+    return f"{words} (frame {frames} of the file)"
 
 
 class Constraints:
@@ -212,7 +222,8 @@ class Constraints:
         return next((each for each in reversed(self.edits) if at in each.at), None)
 
     def _refuse(self, edit: Edit, other: Edit | None, why: str = "") -> None:
-        found = f"{repr(edit)[5:-1]}, which contradicts {repr(other)[5:-1]}"
+        earlier = "an earlier one" if other is None else in_words(other, self.detections)
+        found = f"{in_words(edit, self.detections)}, which contradicts {earlier}"
         raise ParameterError(
             "edits", "statements that agree", f"{found}{f': {why}' * bool(why)}", "undo one of them"
         )

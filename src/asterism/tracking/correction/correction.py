@@ -10,7 +10,7 @@ from asterism.checks import check_kind
 from asterism.errors import ParameterError
 from asterism.model import Edit, TrackingModel, Tracks
 from asterism.tracking.correction.change import Change, change_of
-from asterism.tracking.correction.constraints import Constraints, detections_of
+from asterism.tracking.correction.constraints import Constraints, detections_of, in_words
 from asterism.tracking.correction.solver import NoSolution, Solver
 
 if TYPE_CHECKING:
@@ -119,7 +119,7 @@ class Correction:
             hint = "undo an edit in the way, or cut the track there first"
             raise ParameterError(
                 "edits", "a solution that respects the earlier edits",
-                f"none for {repr(edit)[5:-1]}", hint,
+                f"none for {in_words(edit, self._d)}", hint,
             ) from error  # fmt: skip
         change = change_of(
             edit, detections_of(edit, self._d), self._d.frame_of, (labels, solver.labels),
