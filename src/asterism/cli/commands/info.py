@@ -65,7 +65,7 @@ def _print_several(files: list[Path], *, quiet: bool, json: bool) -> None:
             if isinstance(each, str)
             else (
                 path, each.n_frames, f"{each.rate:g}", each.n_named, f"{each.points_mean:.4g}",
-                f"{each.difficulty}: {each.reason}",
+                each.difficulty,
             )
             for path, each in zip(files, found, strict=True)
         ]  # fmt: skip

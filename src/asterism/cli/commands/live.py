@@ -144,13 +144,18 @@ def _print_address(address: str) -> None:
     console(stderr=True).print(f"page: {address}", markup=False, soft_wrap=True)
 
 
+def _milliseconds(seconds: float) -> str:
+    value = 1e3 * seconds
+    return f"{value:,.0f} ms" if value >= 100 else f"{value:.3g} ms"
+
+
 def _rows(run: am.live.LiveRun) -> list[tuple[str, str]]:
     from asterism.live.loop import FIRST_SECONDS
 
     info = run.info
     no_model = f"none: estimated from the first {FIRST_SECONDS:g} s; a shorter stream needs --model"
     latency = ", ".join(
-        f"{name} {1e3 * info[f'latency_{key}']:.3g} ms"
+        f"{name} {_milliseconds(info[f'latency_{key}'])}"
         for key, name in (("median", "median"), ("p99", "99 %"), ("p999", "99.9 %"))
     )
     return [
