@@ -224,7 +224,8 @@ def connected(
     quiet.setLevel(logging.CRITICAL)  # losses are reported here, in one line
     cluster = None
     if scheduler is None:
-        local: dict[str, Any] = {"dashboard_address": None, "host": "127.0.0.1"}
+        # Its web server takes any free port, as that of another run may have the usual one.
+        local: dict[str, Any] = {"dashboard_address": "127.0.0.1:0", "host": "127.0.0.1"}
         cluster = LocalCluster(
             n_workers=workers, threads_per_worker=1, memory_limit=None,
             silence_logs=logging.CRITICAL, **local,

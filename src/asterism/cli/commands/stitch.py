@@ -85,6 +85,7 @@ def stitch(
         "output": str(out),
         "n_tracks_before": int((capture.tracks.lengths > 0).sum()),
         "n_tracks": found.tracks.n_tracks,
+        "n_tracklets": int(found.tracklets.max(initial=-1)) + 1,
         "n_joins": len(found.joins),
         "n_cuts": len(found.cuts),
         "n_ghosts": len(found.ghosts),
@@ -98,6 +99,7 @@ def stitch(
     elif not quiet:
         rows = [
             ("tracks", f"{figures['n_tracks']}, from {figures['n_tracks_before']}"),
+            ("tracklets", str(figures["n_tracklets"])),
             ("joins", str(len(found.joins))),
             ("links cut", str(len(found.cuts))),
             ("ghosts", str(len(found.ghosts))),
