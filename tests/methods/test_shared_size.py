@@ -21,10 +21,10 @@ PAIRS = np.array([
 ])  # fmt: skip
 
 
-def segments(seed, *, sigma=5.0, own=3e-4, n_frames=300, missing=0.1, n_axes=3):
+def segments(seed, *, sigma=5.0, own=3e-4, n_frames=300, missing=0.1, n_axes=3, uneven=0.0):
     """Segments that accelerate at random, each marker with noise of its own."""
     rng = np.random.default_rng(seed)
-    dt = rng.choice([0.009, 0.01, 0.012]) if seed % 2 else 0.01
+    dt = (0.01 + uneven * (-1.0) ** np.arange(n_frames))[:, None]
     places = []
     for number, size in enumerate(SIZES):
         a = rng.normal(0, sigma, (n_frames, n_axes))
@@ -34,7 +34,7 @@ def segments(seed, *, sigma=5.0, own=3e-4, n_frames=300, missing=0.1, n_axes=3):
         places.append(x[:, None] + shape + rng.normal(0, own, (n_frames, size, n_axes)))
     kept = rng.random((n_frames, sum(SIZES))) >= missing
     d = am.Detections(
-        times=dt * np.arange(n_frames), offsets=np.append(0, np.cumsum(kept.sum(axis=1))),
+        times=np.append(0, dt[:-1].cumsum()), offsets=np.append(0, np.cumsum(kept.sum(axis=1))),
         points=np.concatenate(places, axis=1)[kept],
     )  # fmt: skip
     return am.Tracks(detections=d, labels=np.nonzero(kept)[1])
@@ -49,6 +49,13 @@ def test_a_known_size_is_measured_within_its_standard_error(n_axes):
     assert abs(off.mean()) < 0.5
     assert 0.6 < (off**2).mean() < 1.6
     assert found[:, 1].mean() < 0.5
+
+
+def test_frames_may_be_spaced_unevenly():
+    found = np.array([
+        am.tracking.shared_size(segments(seed, uneven=0.002), *PAIRS.T) for seed in range(60)
+    ])  # fmt: skip
+    assert abs(((found[:, 0] - 5.0) / found[:, 1]).mean()) < 0.9
 
 
 def test_noise_of_its_own_is_not_in_common():
