@@ -124,6 +124,33 @@ def test_a_cut_parts_a_track_exactly_there():
     assert (found.labels[others] == truth.labels[others]).all()
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_cut_between_detections_with_others_between_is_refused(order):
+    truth = am.simulate.cube(frames=100, seed=2)
+    capture = am.Capture(
+        **{f.name: getattr(truth.detections, f.name) for f in dataclasses.fields(am.Detections)},
+        first_frame=1,
+    )
+    own = np.flatnonzero(truth.labels == 3)
+    tracks = dataclasses.replace(truth, detections=capture)
+    correction = am.tracking.Correction(tracks, am.estimate_model(capture).model)
+    with pytest.raises(am.ParameterError) as refused:
+        correction.apply(Edit(kind="cut", at=at(capture, *own[[40, 60]][::order])))
+    places = ["frame 40 point 3", "frame 60 point 3"][::order]
+    shown = [41, 61][::order]
+    assert str(refused.value) == (
+        "edits: expected a cut between detections that follow each other in their track, "
+        f"found cut: {', '.join(places)} (frame {shown[0]}, {shown[1]} of the file), "
+        "with 19 of M03 between them. State cut: frame 59 point 3, frame 60 point 3 "
+        "(frame 60, 61 of the file), or different instead of cut."
+    )
+    assert (correction.tracks.labels == truth.labels).all()
+    assert correction.edits == ()
+    # The message states one that is possible, and one that holds already is no error.
+    correction.apply(Edit(kind="cut", at=at(capture, own[59], own[60])))
+    assert correction.apply(Edit(kind="cut", at=at(capture, own[40], own[60]))).stretches == ()
+
+
 def test_a_group_on_both_sides_of_another_statement_follows_a_cut():
     truth = am.simulate.cube(frames=100, seed=2)
     d, model = truth.detections, am.estimate_model(truth.detections).model

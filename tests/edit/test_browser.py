@@ -229,6 +229,62 @@ def test_a_gap_is_previewed_and_filled(browser, served):
     page.close()
 
 
+@pytest.mark.parametrize("preview", [False, True])
+def test_a_gap_is_left_open_by_its_key(browser, served, preview):
+    page = opened(browser, served)
+    tracks = session_of(served, path="none.toml").tracks
+    gap = max((g for g in tracks.gaps() if g.length < 30), key=lambda g: g.length)
+    page.run(f"asterism.choose({gap.track}); asterism.seek({gap.first})")
+    if preview:
+        page.key("g")
+        page.wait("document.getElementById('filling').innerText.includes('Leave open')")
+        assert "⇧G" in page.run("document.getElementById('filling').innerText")
+    page.key("g", shift=True)
+    on_disk(page, 1)
+    (edit,) = edits_of(served)
+    assert (edit.kind, edit.at[0][0], edit.at[1][0]) == ("no_fill", gap.first - 1, gap.last + 1)
+    assert page.run("document.getElementById('filling').textContent") == ""
+    page.key("?")
+    assert "leave that gap open" in page.run("document.getElementById('keys').innerText")
+    page.close()
+
+
+def test_different_markers_are_stated_by_keyboard_and_pointer(browser, served):
+    page = opened(browser, served)
+    tracks = session_of(served, path="none.toml").tracks
+    d = tracks.detections
+    there = [set(tracks.labels[d.frame_of == t]) for t in (100, 160)]
+    one, other = sorted(set.intersection(*there) - {-1})[:2]
+    page.key("Escape")
+    page.run(f"asterism.seek(100); asterism.choose({one})")
+    page.key("j", shift=True)
+    assert "Select two tracks, or mark another frame" in page.run(ERROR)
+    page.key("e")
+    page.run(f"asterism.choose({other})")
+    page.key("j", shift=True)
+    on_disk(page, 1)
+    page.key("Escape")  # the page went to the next decision
+    page.run("asterism.seek(100)")
+    page.key("h", shift=True)
+    page.run(f"asterism.seek(160); asterism.choose({one})")
+    press(page, "#edit-apart")
+    on_disk(page, 2)
+    pressed = "document.getElementById('edit-mark').getAttribute('aria-pressed')"
+    assert page.run(pressed) == "false"
+    pair, parted = edits_of(served)
+    session = session_of(served)
+    for edit, before in ((pair, {one, other}), (parted, {one})):
+        at = [d.offsets[frame] + point for frame, point in edit.at]
+        assert edit.kind == "different"
+        assert set(tracks.labels[at]) == before
+        assert len(set(session.tracks.labels[at])) == 2
+    assert [frame for frame, _ in parted.at] == [100, 160]
+    assert_same_tracks(page, session)
+    page.key("?")
+    assert "they are different markers" in page.run("document.getElementById('keys').innerText")
+    page.close()
+
+
 def test_a_point_of_clutter_is_joined_by_keyboard(browser, served):
     page = opened(browser, served)
     tracks = session_of(served, path="none.toml").tracks

@@ -62,6 +62,24 @@ def test_collected_edits_are_those_of_the_capture(browser, folder, monkeypatch):
     assert again.names[again.labels[capture.offsets[name.at[0][0]] + name.at[0][1]]] == 'C7 "a"'
 
 
+def test_a_track_is_not_cut_where_the_page_hides_frames(browser, folder, monkeypatch):
+    tracks = am.track(am.read(folder / CAPTURE))
+    monkeypatch.setattr(
+        "asterism.reporting.page.thinning.MOST_POINTS", tracks.detections.n_points // 2
+    )
+    am.report(tracks, folder / "thinned.html", editor=True)
+    page = browser.page(folder / "thinned.html")
+    state, error = (f"document.getElementById('edit-{name}').textContent"
+                    for name in ("state", "error"))  # fmt: skip
+    page.run("asterism.seek(20); asterism.choose(3)")
+    page.key("c")
+    page.wait(f"{error}.includes('Frames in between are not on this page')")
+    assert page.run(state) == "0 edits in this page"
+    page.key("k")
+    page.wait(f"{state} === '1 edit in this page'")
+    page.close()
+
+
 def test_pages_without_an_editor_carry_none_of_it(folder):
     tracks = am.track(am.read(folder / CAPTURE))
     am.report(tracks, folder / "plain.html")

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 import signal
 
 import numpy as np
 
 import asterism as am
+from asterism.edit.hub import Hub
 from tests.edit.served import CAPTURE, Served, wait
 
 
@@ -45,6 +47,20 @@ def test_an_edit_is_on_disk_when_it_is_answered(served):
     status, answer = served.post("redo")
     assert (status, answer["n_undone"], len(answer["edits"])) == (200, 0, 1)
     assert served.post("redo")[0] == 409
+
+
+def test_a_cut_of_a_page_in_part_is_directly_before_the_later_detection(tmp_path, monkeypatch):
+    d = am.simulate.cube(frames=60, seed=1).detections
+    monkeypatch.setattr("asterism.reporting.page.thinning.MOST_POINTS", d.n_points // 3)
+    session = am.edit.Session.open(d, tmp_path / "trial.edits.toml")
+    hub = Hub(session, tmp_path / "out.csv")
+    shown = [hub.view.detection(i) for i in range(8 * 20)]
+    own = [i for i, each in enumerate(shown) if session.tracks.labels[each] == 2]
+    message = {"kind": "cut", "detections": own[9:11], "name": ""}
+    asyncio.run(hub.act("edit", message))
+    ((first, _), (last, _)) = session.edits[0].at
+    assert (first, last) == (29, 30)
+    assert [int(d.frame_of[shown[i]]) for i in own[9:11]] == [27, 30]
 
 
 def test_an_assignment_is_on_disk_once_it_is_confirmed_and_not_before(by_method):

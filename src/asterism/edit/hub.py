@@ -148,6 +148,8 @@ class Hub:
         session, view = self.session, self.view
         if action == "edit":
             own = [view.detection(i) for i in message["detections"]]
+            if message["kind"] == "cut" and len(own) == 2:
+                own[0] = self._before(own[1], own[0])
             return session.edit(message["kind"], *own, name=message["name"])
         if action == "reassign":
             if self._offer is None or not self._offer[0] == message["version"] == len(self._log):
@@ -168,6 +170,13 @@ class Hub:
         if i is not None and i >= len(decision.alternatives):
             raise ParameterError("alternative", f"below {len(decision.alternatives)}", i)
         return session.choose(decision, None if i is None else decision.alternatives[i])
+
+    def _before(self, later: int, shown: int) -> int:
+        """Return the detection before a later one in its track, which the page may not show."""
+        labels = self.session.tracks.labels
+        if labels[shown] != labels[later] or labels[later] < 0 or shown >= later:
+            return shown
+        return int(np.flatnonzero(labels[:later] == labels[later])[-1])
 
     def _gap(self, message: Message) -> tuple[int, int, int]:
         """Return track, first and last frame of a gap that the page describes."""

@@ -30,7 +30,17 @@ export class Collector extends EventTarget {
       const [t, point] = numbering.place(i);
       return [numbering.capture.frames[t] + header.shift, point];
     });
+    if (kind === "cut" && this.hides(detections)) {
+      throw new Error("Frames in between are not on this page: cut the track by asterism edit.");
+    }
     return { kind, at, name, when: `${new Date().toISOString().slice(0, 19)}+00:00` };
+  }
+
+  /** Whether there are frames between two detections that the page does not show. */
+  hides([one, other]) {
+    const { frame, capture } = this.numbering;
+    const shown = frame[other] - frame[one];
+    return capture.frames[frame[other]] - capture.frames[frame[one]] !== shown;
   }
 
   download() {

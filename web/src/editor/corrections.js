@@ -78,6 +78,24 @@ export class Corrections {
     return [edit("same", one, other)];
   }
 
+  /**
+   * Two tracks are different markers, as are a point of clutter and a track, or a track at the
+   * marked frame and at this one.
+   */
+  apart() {
+    const { numbering, selection, state, marked, track } = this;
+    const t = state.frame;
+    if (selection.point >= 0) return [edit("different", numbering.nearest(track, t), selection.point)];
+    if (selection.tracks.length > 1) {
+      return [edit("different", ...this.pair().map((k) => numbering.nearest(k, t)))];
+    }
+    if (marked < 0) throw new Error("Select two tracks, or mark another frame of the track: Shift H.");
+    const [one, other] = [numbering.nearest(track, marked), numbering.nearest(track, t)];
+    if (one === other) throw new Error("The track has the same detection at the marked frame and here.");
+    this.marked = -1;
+    return [edit("different", one, other)];
+  }
+
   /** The track goes on as another marker from this frame on, or was one up to this frame. */
   cut(isBack) {
     const t = this.state.frame + (isBack ? 1 : 0);

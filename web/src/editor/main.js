@@ -60,11 +60,13 @@ class Editor {
       mark: () => this.mark(),
       ahead: () => this.lookAhead(),
       join: () => this.correct(() => corrections.join()),
+      apart: () => this.correct(() => corrections.apart()),
       cut: () => this.correct(() => corrections.cut(false)),
       "cut-back": () => this.correct(() => corrections.cut(true)),
       "cut-whole": () => this.correct(() => corrections.cutWhole()),
       ghost: () => this.correct(() => corrections.ghost()),
       fill: () => this.preview(),
+      open: () => this.fill("no_fill"),
       keep: () => selection.keep(),
       reassign: () => this.previewAgain(false),
       "reassign-even": () => this.previewAgain(true),
@@ -77,7 +79,9 @@ class Editor {
     for (const [name, does] of Object.entries(act)) byId(`edit-${name}`).addEventListener("click", does);
     Object.assign(keys, {
       n: () => decisions.step(1), p: () => decisions.step(-1),
-      x: act.swap, j: act.join, v: act["cut-whole"], k: act.ghost, g: act.fill, e: act.keep,
+      x: act.swap, v: act["cut-whole"], k: act.ghost, e: act.keep,
+      j: (event) => (event.shiftKey ? act.apart : act.join)(),
+      g: (event) => (event.shiftKey ? act.open : act.fill)(),
       t: (event) => act[event.shiftKey ? "reassign-even" : "reassign"](),
       h: (event) => (event.shiftKey ? act.mark : act.here)(), q: act.ahead,
       c: (event) => (event.shiftKey ? act["cut-back"] : act.cut)(),
@@ -252,7 +256,7 @@ class Editor {
     const worst = 1000 * Math.max(...answer.sigma);
     byId("filling").replaceChildren(
       make("p", {}, `Gap, ${frames(answer.first, answer.last)}: standard deviation up to ${worst.toPrecision(2)} mm. The band is two of them.`),
-      make("div", { className: "tools" }, button("Fill", "Enter", this.confirm), button("Leave open", "", () => this.fill("no_fill"))),
+      make("div", { className: "tools" }, button("Fill", "Enter", this.confirm), button("Leave open", "⇧G", () => this.fill("no_fill"))),
     );
     this.stage?.redraw();
   }
@@ -299,8 +303,13 @@ class Editor {
     );
   }
 
+  /** Fill the gap of the preview, or that of the selected track, or leave it open. */
   fill(kind) {
-    const gap = this.filling;
+    let gap = this.filling;
+    this.attempt(() => {
+      gap ??= this.corrections.gap();
+    });
+    if (!gap) return;
     this.preview(null);
     this.send("fill", { ...gap, kind });
   }
@@ -313,7 +322,7 @@ class Editor {
   }
 
   withoutServer() {
-    for (const name of ["fill", "redo", "reassign", "reassign-even", "ahead"]) byId(`edit-${name}`).hidden = true;
+    for (const name of ["fill", "open", "redo", "reassign", "reassign-even", "ahead"]) byId(`edit-${name}`).hidden = true;
     byId("edit-save").firstChild.textContent = "Download edits";
     byId("decision").hidden = true;
     byId("uncertain-tile").hidden = true;

@@ -86,8 +86,8 @@ export class Selection {
     byId("selection").replaceChildren(...parts);
     const [n, hasPoint] = [this.tracks.length, this.point >= 0];
     const can = {
-      swap: n === 2, join: n === 2 || (n === 1 && hasPoint), cut: n === 1, "cut-back": n === 1,
-      "cut-whole": n === 1, ghost: n >= 1, fill: n === 1, keep: n === 1 && this.kept < 0,
+      swap: n === 2, join: n === 2 || (n === 1 && hasPoint), apart: n === 1 || n === 2, cut: n === 1, "cut-back": n === 1,
+      "cut-whole": n === 1, ghost: n >= 1, fill: n === 1, open: n === 1, keep: n === 1 && this.kept < 0,
       give: n === 1 || hasPoint,
     };
     for (const [name, is] of Object.entries(can)) byId(`edit-${name}`).disabled = !is;

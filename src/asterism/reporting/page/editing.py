@@ -23,8 +23,9 @@ _KEYS = {
     "N, P": "next and previous uncertain decision",
     "1 … 9": "choose the answer with that number; leave out that change of a preview",
     "X": "exchange two selected tracks from this frame on",
-    "H, Shift H": "exchange two tracks in this frame alone; mark the frame from which it begins",
-    "J": "join two selected tracks, or a point and a track",
+    "H, Shift H": "exchange two tracks in this frame alone; mark the frame from which it begins, "
+    "or at which a track is a different marker",
+    "J, Shift J": "join two selected tracks, or a point and a track; they are different markers",
     "U": "select the next point of clutter in this frame",
     "E": "keep the selected track, to select a second one",
     "O": "lasso: draw around markers to select them",
@@ -32,7 +33,7 @@ _KEYS = {
     "V": "cut out the part without gaps at this frame",
     "I": "give a name; Enter confirms, Esc leaves the field",
     "K": "delete the selected part: it is a ghost",
-    "G": "preview the fill of the gap at this frame",
+    "G, Shift G": "preview the fill of the gap at this frame; leave that gap open",
     "Q": "preview each answer and correction before it is made",
     "Enter": "confirm the preview",
     "T, Shift T": "preview an assignment of all uncertain points; the same at even odds",
@@ -41,7 +42,7 @@ _KEYS = {
     "B": "save",
     "?": "list of keys",
 }
-_SERVED = ("1 … 9", "G", "Q", "Enter", "T, Shift T", "Z, Y", "R", "B")
+_SERVED = ("1 … 9", "G, Shift G", "Q", "Enter", "T, Shift T", "Z, Y", "R", "B")
 
 
 def editing_of(detections: Detections, file: str) -> Editing:
@@ -122,13 +123,15 @@ PANEL = element(
             "div",
             _button("edit-swap", "Exchange", "X", "Exchange two tracks from this frame on"),
             _button("edit-here", "Exchange here", "H", "Exchange in this frame or from the mark"),
-            _button("edit-mark", "Mark", "⇧H", "Mark the frame from which an exchange begins"),
+            _button("edit-mark", "Mark", "⇧H", "Mark the frame of an exchange or a difference"),
             _button("edit-join", "Join", "J", "Join two tracks"),
+            _button("edit-apart", "Different", "⇧J", "Both are different markers"),
             _button("edit-ghost", "Ghost", "K", "Delete the part: it is a ghost"),
             _button("edit-cut", "Cut from here", "C", "Cut the track from this frame on"),
             _button("edit-cut-back", "Cut to here", "⇧C", "Cut the track up to this frame"),
             _button("edit-cut-whole", "Cut out", "V", "Cut out the part without gaps"),
             _button("edit-fill", "Fill gap", "G", "Preview the fill of the gap at this frame"),
+            _button("edit-open", "Leave open", "⇧G", "Leave the gap at this frame open"),
             _button("edit-ahead", "Preview first", "Q", "Preview edits before they are made"),
             _button("edit-reassign", "Assign again", "T", "Preview an assignment of all points"),
             _button("edit-reassign-even", "At even odds", "⇧T", "Preview it at even odds"),

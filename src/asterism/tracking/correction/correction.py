@@ -106,10 +106,13 @@ class Correction:
         Raises
         ------
         ParameterError
-            If it contradicts earlier edits or has no solution; nothing changes then.
+            If it contradicts earlier edits, has no solution, or is a cut between detections of a
+            track that do not follow each other; nothing changes then.
         """
         check_kind("edit", edit, Edit, 'Edit(kind="same", at=((10, 3), (48, 0)))')
         constraints = Constraints.of((*self.edits, edit), self._d)
+        if edit.kind == "cut":
+            self._check_cut(edit)
         solver = self._solver
         labels, names = solver.labels.copy(), list(solver.names)
         try:
@@ -129,6 +132,26 @@ class Correction:
         self._now = None
         self._constraints = constraints
         return change
+
+    def _check_cut(self, edit: Edit) -> None:
+        """Raise if a track has other detections between both of a cut.
+
+        A cut of detections that are on different tracks already is respected.
+        """
+        labels, d = self._solver.labels, self._d
+        first, last = sorted(detections_of(edit, d))
+        between = np.flatnonzero(labels[first:last] == labels[last])[1:] + first
+        if labels[first] < 0 or labels[first] != labels[last] or not len(between):
+            return
+        frames = [int(d.frame_of[i]) for i in (between[-1], last)]
+        points = [int(i - d.offsets[t]) for i, t in zip((between[-1], last), frames, strict=True)]
+        nearest = Edit(kind="cut", at=tuple(zip(frames, points, strict=True)))
+        name = self.tracks.display_names[labels[last]]
+        raise ParameterError(
+            "edits", "a cut between detections that follow each other in their track",
+            f"{in_words(edit, d)}, with {len(between)} of {name} between them",
+            f"state {in_words(nearest, d)}, or different instead of cut",
+        )  # fmt: skip
 
     def anchor(self, candidates: NDArray[np.int64]) -> int:
         """Return the detection that stands best for the marker of a track.
