@@ -152,7 +152,13 @@ class SourceError(AsterismError):
 
 
 class SourceLost(SourceError):
-    """The connection to a source of a stream is gone."""
+    """The connection to a source of a stream is gone.
+
+    Parameters
+    ----------
+    message : str
+        What is wrong, without the name of the source: the log message begins with it.
+    """
 
 
 class SinkError(AsterismError):

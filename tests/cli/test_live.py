@@ -59,6 +59,23 @@ def test_the_counts_are_a_table(capture, capsys):
     assert "median" in text
 
 
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (1.234e-5, "0.0123 ms"), (1.234e-3, "1.23 ms"), (0.0123456, "12.3 ms"),
+        (0.0999, "99.9 ms"), (0.1, "100 ms"), (0.23456, "235 ms"), (2.5, "2,500 ms"),
+    ],
+)  # fmt: skip
+def test_latencies_are_in_milliseconds_with_three_digits(monkeypatch, capsys, seconds, text):
+    latency = am.live.LatencyHistogram()
+    latency.add(seconds)
+    run = am.live.LiveRun(source="trial.c3d", n_frames=1, rate=60.0, latency=latency)
+    monkeypatch.setattr("asterism.live.run", lambda *_, **__: run)
+    assert main(["live", "trial.c3d"]) == 0
+    row = next(line for line in capsys.readouterr().out.splitlines() if "latency" in line)
+    assert row.split(maxsplit=1)[1] == f"median {text}, 99 % {text}, 99.9 % {text}"
+
+
 def test_standard_output_is_a_sink_and_nothing_else(capture, capsys):
     line = "live in.c3d?speed=max --model model.toml --to -"
     assert main(line.split()) == 0

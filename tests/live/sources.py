@@ -89,7 +89,7 @@ class Kept:
         self.is_open = False
 
 
-LOST = SourceLost("memory: the connection is gone.")
+LOST = SourceLost("the connection is gone.")
 
 
 def with_faults(frames, rng, *, loss=0.0, twice=0.0, shuffled=0.0, garbage=0.0):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import logging
 import math
 import socket
 import struct
@@ -16,9 +17,11 @@ import pytest
 
 import asterism as am
 from asterism.errors import ParameterError, SourceError, SourceLost
+from asterism.live.faults import Faults
 from asterism.live.protocols import qtm
 from asterism.live.protocols.qtm import Packet
 from asterism.live.protocols.qtm_components import Component, encode_positions
+from asterism.live.receiver import Receiver
 from asterism.live.sources.base import EndOfSource
 from asterism.live.sources.json_lines import StandardInput, UdpSource
 from asterism.live.sources.lsl import LslSource
@@ -54,6 +57,40 @@ def test_qtm_delivers_markers_and_points():
             source.receive(5)
         with pytest.raises(SourceLost):
             source.receive(5)
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        QtmSource("qtm://127.0.0.1", "127.0.0.1", 1),
+        NatNetSource("natnet://127.0.0.1", "127.0.0.1", 1),
+        LslSource("lsl://points", "points"),
+        UdpSource("udp://:1", "127.0.0.1", 1),
+    ],
+    ids=lambda source: type(source).__name__,
+)
+def test_the_message_of_a_lost_connection_has_the_name_once(source, monkeypatch, caplog):
+    monkeypatch.setattr(source, "open", lambda: None)  # of the next attempt
+    receiver = Receiver(source, Faults(source.name))
+    with caplog.at_level(logging.WARNING, logger="asterism"):
+        assert receiver.next(0.01) is None
+    receiver.close()
+    (message,) = caplog.messages
+    assert message.startswith(f"{source.name}: the source is not open. It is connected again")
+    assert message.count(source.name) == 1
+
+
+def test_the_message_of_a_closed_connection_has_the_name_once(caplog):
+    with qtm_server() as server:
+        source = QtmSource("qtm://127.0.0.1", "127.0.0.1", server.port)
+        source.open()
+        receiver = Receiver(source, Faults(source.name))
+    with caplog.at_level(logging.WARNING, logger="asterism"):
+        assert receiver.next(5) is None
+    receiver.close()
+    (message,) = (text for text in caplog.messages if "connected again" in text)
+    assert message.startswith("qtm://127.0.0.1: the connection is lost: ")
+    assert message.count(source.name) == 1
 
 
 def test_qtm_is_opened_again_after_a_loss():

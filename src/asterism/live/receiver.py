@@ -106,8 +106,7 @@ class Receiver:
         try:
             return self._source.receive(timeout)
         except SourceLost as lost:
-            text = str(lost).removeprefix(f"{self._source.name}: ")
-            self._faults.add("disconnects", f"{text} It is connected again when it can")
+            self._faults.add("disconnects", f"{lost} It is connected again when it can")
             self._opening = threading.Thread(target=self._open_again, name="opening", daemon=True)
             self._opening.start()
             return None

@@ -80,7 +80,7 @@ class UdpSource:
             If the source is not open.
         """
         if self._socket is None:
-            raise SourceLost(f"{self.name}: is not open.")
+            raise SourceLost("the source is not open.")
         end = time.monotonic() + timeout
         while True:
             while self._lines:

@@ -73,12 +73,12 @@ class LslSource:
             If the stream is gone.
         """
         if self._inlet is None:
-            raise SourceLost(f"{self.name}: is not open.")
+            raise SourceLost("the source is not open.")
         try:
             sample, stamp = self._inlet.pull_sample(timeout=timeout)
         except Exception as error:  # pylsl has no common class of errors
             self.close()
-            raise SourceLost(f"{self.name}: the stream is lost: {error}.") from error
+            raise SourceLost(f"the stream is lost: {error}.") from error
         arrived = time.perf_counter()
         if sample is None:
             return None

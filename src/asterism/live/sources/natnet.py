@@ -144,7 +144,7 @@ class NatNetSource:
         end = time.monotonic() + timeout
         while True:
             if self._command is None:
-                raise SourceLost(f"{self.name}: is not open.")
+                raise SourceLost("the source is not open.")
             while self._early:
                 found = self._decoded(*self._early.popleft())
                 if found is not None:
@@ -158,7 +158,7 @@ class NatNetSource:
                 except OSError as error:
                     self.close()
                     text = error.strerror or str(error)
-                    raise SourceLost(f"{self.name}: the server is lost: {text}.") from error
+                    raise SourceLost(f"the server is lost: {text}.") from error
                 arrived = time.perf_counter()
                 self._heard = time.monotonic()
                 found = self._decoded(packet, arrived)
@@ -171,7 +171,7 @@ class NatNetSource:
         now = time.monotonic()
         if now - self._heard > _SILENT_SECONDS:
             self.close()
-            raise SourceLost(f"{self.name}: the server has been silent for {_SILENT_SECONDS:g} s.")
+            raise SourceLost(f"the server has been silent for {_SILENT_SECONDS:g} s.")
         if now - self._kept_alive > _ALIVE_SECONDS:
             self._kept_alive = now
             assert self._command is not None

@@ -196,7 +196,7 @@ class QtmSource:
             If the connection is gone.
         """
         if self._socket is None:
-            raise SourceLost(f"{self.name}: is not open.")
+            raise SourceLost("the source is not open.")
         end = time.monotonic() + timeout
         while not self._ready:
             try:
@@ -205,7 +205,7 @@ class QtmSource:
                 # After a wrong size the boundary of packets is lost.
                 self.close()
                 text = getattr(error, "strerror", None) or str(error)
-                raise SourceLost(f"{self.name}: the connection is lost: {text}.") from error
+                raise SourceLost(f"the connection is lost: {text}.") from error
             if packet is None:
                 return None
             if self._images is None:
