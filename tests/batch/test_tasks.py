@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import os
+import secrets
 import signal
 import socket
 import subprocess
 import sys
-import threading
 import time
 
 import pytest
 
 import asterism as am
-from asterism.batch.tasks import run_tasks
+from asterism.batch.tasks import connected, run_tasks
 from asterism.errors import FormatError, ParameterError
 from tests.batch.conftest import contents
 from tests.large.scenes import dense, labels_of
@@ -48,9 +48,12 @@ def deadly(x, *, progress):
 
 
 def free_port():
-    with socket.socket() as found:
-        found.bind(("127.0.0.1", 0))
-        return found.getsockname()[1]
+    """A port below those that the system gives away, so that no other program takes it."""
+    for port in secrets.SystemRandom().sample(range(20_000, 30_000), 100):
+        with socket.socket() as found, contextlib.suppress(OSError):
+            found.bind(("127.0.0.1", port))
+            return port
+    raise AssertionError("no free port")
 
 
 class Processes:
@@ -91,6 +94,9 @@ class Processes:
 def processes():
     made = Processes()
     made.start()
+    # A batch waits only some seconds for a scheduler that it has not reached before.
+    with connected(made.address, 1, 120.0):
+        pass
     yield made
     made.stop()
 
@@ -185,28 +191,23 @@ def test_a_task_that_waited_at_a_killed_worker_is_tried_alone(monkeypatch):
 def test_a_batch_outlives_its_workers_and_its_scheduler(made_captures, serial, processes, tmp_path):
     out, events, harmed = tmp_path / "out", [], []
 
-    def harm():
-        while not events:
-            time.sleep(0.02)
-        os.killpg(processes.workers[0].pid, signal.SIGKILL)
-        harmed.append("worker")
-        while not any(stage == "done" for _, stage in events):
-            time.sleep(0.02)
-        processes.stop()
-        harmed.append("scheduler")
-        time.sleep(0.5)
-        processes.start()
-
     def heard(name, stage, *_):
-        if name and stage != "failed":
-            events.append((name, stage))
+        # The batch waits meanwhile, so that two captures have no result when the scheduler is lost.
+        if not name or stage == "failed":
+            return
+        events.append((name, stage))
+        if not harmed:
+            os.killpg(processes.workers[0].pid, signal.SIGKILL)
+            harmed.append("worker")
+        elif stage == "done" and "scheduler" not in harmed:
+            processes.stop()
+            harmed.append("scheduler")
+            time.sleep(0.5)
+            processes.start()
 
-    thread = threading.Thread(target=harm)
-    thread.start()
     batch = am.batch.run(
         [made_captures], out, scheduler=processes.address, send=True, progress=heard
     )
-    thread.join()
     n_done = len([stage for _, stage in events if stage == "done"])
     assert harmed == ["worker", "scheduler"]
     assert n_done == 3

@@ -122,13 +122,25 @@ def test_stopped_early(folder):
     ],
     ids=["finaliser", "weak reference"],
 )
-def test_a_signal_where_exceptions_are_lost(where):
+@pytest.mark.parametrize("is_loaded", [False, True], ids=["idle", "loaded"])
+def test_a_signal_where_exceptions_are_lost(where, is_loaded):
     # Imports hold such callbacks, so that any command may be stopped within one. Where the signal
-    # is lost, the command runs to its end.
+    # is lost, the command runs to its end. On a loaded machine, the main thread goes on only long
+    # after it has started another one: the signal must not be sent again meanwhile.
+    load = (
+        "import threading\n"
+        "begin = threading.Thread.start\n"
+        "def start(thread):\n"
+        "    begin(thread)\n"
+        "    end = time.monotonic() + 0.1\n"
+        "    while time.monotonic() < end: time.sleep(0.001)\n"
+        "threading.Thread.start = start\n"
+    )
     body = "".join(f"    {line}\n" for line in where.splitlines())
     script = (
         "import signal, sys, os, time\n"
         "from asterism.cli.exit_codes import exit_code\n"
+        f"{load if is_loaded else ''}"
         "def ask(): os.kill(os.getpid(), signal.SIGTERM)\n"
         f"def run():\n{body}    for _ in range(1000): time.sleep(0.005)\n"
         "sys.exit(exit_code(run))\n"

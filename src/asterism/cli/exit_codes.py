@@ -10,12 +10,13 @@ import sys
 import threading
 from contextlib import contextmanager
 from io import TextIOWrapper
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 from asterism.errors import AsterismError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
+    from types import FrameType
 
 __all__ = ["BROKEN_PIPE", "exit_code"]
 
@@ -101,31 +102,50 @@ def _stopping() -> Generator[None, None, None]:
         yield
         return
 
-    def stop(signum: int, _: object) -> NoReturn:
+    def stop(signum: int, frame: FrameType | None) -> None:
+        while frame is not None:
+            if frame.f_code is again.__code__:  # where an exception would be lost too
+                send_later(signum)
+                return
+            frame = frame.f_back
         for number in before:
             signal.signal(number, signal.SIG_IGN)
         raise Stopped(signum)
 
     def again(lost: sys.UnraisableHookArgs) -> None:
         # The signal arrived during a finaliser or the callback of a weak reference, where Python
-        # discards exceptions. It is sent again after the finaliser.
+        # discards exceptions. It is sent again until one of them stops the command.
         if not isinstance(lost.exc_value, Stopped):
             hook(lost)
             return
         for number in before:
             signal.signal(number, stop)
-        threading.Timer(0.01, _thread.interrupt_main, [lost.exc_value.signum]).start()
+        send_later(lost.exc_value.signum)
+
+    def send_later(signum: int) -> None:
+        if not senders:
+            sender = threading.Thread(target=send, args=[signum], daemon=True)
+            senders.append(sender)
+            sender.start()
+
+    def send(signum: int) -> None:
+        while not ended.wait(0.01):
+            _thread.interrupt_main(signal.Signals(signum))
 
     # A signal that the parent process ignores (nohup, a background job) stays ignored.
     known = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     before = {number: handler for number, handler in known.items() if handler != signal.SIG_IGN}
-    hook = sys.unraisablehook
+    hook, ended = sys.unraisablehook, threading.Event()
+    senders: list[threading.Thread] = []
     try:
         sys.unraisablehook = again
         for number in before:  # a signal may arrive from the first one on
             signal.signal(number, stop)
         yield
     finally:
+        ended.set()
+        for each in senders:
+            each.join()
         sys.unraisablehook = hook
         for number, handler in before.items():
             signal.signal(number, handler)
