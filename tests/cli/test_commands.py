@@ -14,7 +14,7 @@ import pytest
 
 import asterism as am
 from asterism.cli import main
-from tests.cli.runs import refused, run
+from tests.cli.runs import printed, refused, run
 
 
 def test_bursts_of_missed_detections_are_made_and_estimated(scene, capsys):
@@ -181,7 +181,18 @@ def test_info(scene, capsys):
     raw = bytearray((scene / "t.c3d").read_bytes())
     raw[raw.find(b"POINT") + 0 : raw.find(b"POINT") + 5] = b"PAINT"
     (scene / "odd.c3d").write_bytes(raw)
-    assert "warning" in run("info odd.c3d", capsys)
+    (warning,) = json.loads(run("info odd.c3d --json", capsys))["warnings"]
+    shown = {
+        line: "".join(printed(line, capsys))
+        for line in (
+            "info odd.c3d",
+            "info odd.c3d --json",
+            "info odd.c3d --quiet",
+            "info odd.c3d truth.csv",
+        )
+    }
+    for line, text in shown.items():
+        assert "".join(text.split()).count("".join(warning.split())) == 1, line
 
 
 def test_methods_and_scenes_are_those_of_the_library(capsys):

@@ -147,12 +147,12 @@ def test_weights_are_those_from_which_detections_were_drawn():
     rng = np.random.default_rng(5)
     densities = rng.normal(0, 3, (20_000, len(COMPONENTS)))
     # Draw the component of each detection, and reject: p(c | densities) ∝ w_c exp(density).
-    from asterism.tracking.rigidity.shared import ALONE, _fitted_weights
+    from asterism.tracking.rigidity.shared import ALONE, fitted_weights
 
     weights = WEIGHTS / WEIGHTS.sum()
     mixture = np.exp(densities) @ weights / np.exp(densities).mean(axis=1)
     kept = rng.random(len(densities)) < mixture / mixture.max()
-    found = _fitted_weights(densities[kept], np.zeros(int(kept.sum()), dtype=np.int64), 1)[0]
+    found = fitted_weights(densities[kept], np.zeros(int(kept.sum()), dtype=np.int64), 1)[0]
     found[0] -= ALONE
     found /= 1 - ALONE
     share = np.exp(densities[kept]) * weights

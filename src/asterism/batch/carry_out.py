@@ -112,7 +112,9 @@ def _carry_out(
             capture.path,
         )
     write(tracks, out, format=run.format)
-    summary = summarize(result, out=out, method=result.recipe.method, seconds=seconds)
+    summary = summarize(
+        result, out=out, method=result.recipe.method, seconds=seconds, n_edits=len(edits)
+    )
     for name, text in summary.rows():
         log.info("%s %s", name, text)
     return result, summary

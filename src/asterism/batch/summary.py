@@ -7,11 +7,10 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 import asterism as am
 from asterism.reporting.names_found import naming_figures, naming_rows
 from asterism.reporting.places import places_of
+from asterism.reporting.shared_evidence import SharedEvidence, shared_evidence
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -36,6 +35,8 @@ class Summary:
         Number of tracks, of their detections, and of detections without a track.
     n_gaps : int
         Number of gaps in tracks.
+    n_edits : int
+        Number of edits that the tracks respect.
     longest_gaps : tuple of am.model.Gap
         Longest gaps, at most three.
     gap_names : tuple of str or None
@@ -51,9 +52,9 @@ class Summary:
         Expected number of detections with a wrong identity at these places.
     info : dict
         Figures of the method, such as the error of approximations.
-    shared : dict or None
-        Size of the acceleration that the markers of rigid segments have in common, m/s², its
-        standard error, and the number of these markers; None where the method has no bonds.
+    shared : SharedEvidence or None
+        Size of the acceleration that the markers of rigid segments have in common, and its
+        evidence on frames left out; None where the method has no bonds.
     naming : dict or None
         Names and their probabilities as plain values; None without marker sets.
     filled : dict or None
@@ -73,6 +74,7 @@ class Summary:
     n_labelled: int
     n_clutter: int
     n_gaps: int
+    n_edits: int
     longest_gaps: tuple[am.model.Gap, ...]
     gap_names: tuple[str | None, ...]
     seconds: float
@@ -81,7 +83,7 @@ class Summary:
     places: int
     expected_wrong: float
     info: dict[str, float]
-    shared: dict[str, float] | None = None
+    shared: SharedEvidence | None = None
     naming: dict[str, Any] | None = None
     filled: dict[str, int] | None = None
     truncated: str = ""
@@ -96,13 +98,14 @@ class Summary:
         ]
         share = 100 * self.n_labelled / max(self.n_detections, 1)
         return [
+            *([("edits", f"{self.n_edits} respected")] if self.n_edits else []),
             ("tracks", str(self.n_tracks)),
             ("detections labelled", f"{self.n_labelled} of {self.n_detections} ({share:.1f} %)"),
             ("clutter", str(self.n_clutter)),
             ("gaps", str(self.n_gaps)),
             *((("longest gaps"), gap) if i == 0 else ("", gap) for i, gap in enumerate(gaps)),
             *stitching_rows(self.info),
-            *self._shared(),
+            *(self.shared.rows() if self.shared else []),
             *self.named,
             *self._filled(),
             *self._certainty(),
@@ -111,12 +114,6 @@ class Summary:
             ("time", f"{self.seconds:.3g} s, {self.frames_per_second:,.0f} frames/s"),
             ("written", self.output),
         ]
-
-    def _shared(self) -> list[tuple[str, str]]:
-        if self.shared is None:
-            return []
-        size = f"{self.shared['size']:.3g} ± {self.shared['std']:.1g} m/s²"
-        return [("shared acceleration", f"{size}, of {self.shared['n_markers']:.0f} tracks")]
 
     def _filled(self) -> list[tuple[str, str]]:
         if self.filled is None:
@@ -164,15 +161,9 @@ def stitching_rows(info: Mapping[str, float]) -> list[tuple[str, str]]:
     return [("stitching", text)]
 
 
-def shared_figures(tracks: am.Tracks) -> dict[str, float] | None:
-    """Return the acceleration that rigid segments have in common; None without such segments."""
-    bonds = am.tracking.learn_bonds(dataclasses.replace(tracks, names=(None,) * tracks.n_tracks))
-    pairs = bonds.pairs[bonds.rigid]
-    size, std = am.tracking.shared_size(tracks, *pairs.T)
-    return {"size": size, "std": std, "n_markers": len(np.unique(pairs))} if size else None
-
-
-def summarize(result: am.tracking.Tracked, *, out: Path, method: str, seconds: float) -> Summary:
+def summarize(
+    result: am.tracking.Tracked, *, out: Path, method: str, seconds: float, n_edits: int
+) -> Summary:
     """Compute the figures of a finished tracking.
 
     Parameters
@@ -185,8 +176,11 @@ def summarize(result: am.tracking.Tracked, *, out: Path, method: str, seconds: f
         Name of the method.
     seconds : float
         Running time.
+    n_edits : int
+        Number of edits that the tracks respect.
     """
     tracks, naming, filling = result.tracks.measured(), result.naming, result.filling
+    recipe = result.recipe
     d = tracks.detections
     assert isinstance(d, am.Capture)
     places = places_of(tracks)
@@ -205,6 +199,7 @@ def summarize(result: am.tracking.Tracked, *, out: Path, method: str, seconds: f
         n_labelled=n_labelled,
         n_clutter=d.n_points - n_labelled,
         n_gaps=len(gaps),
+        n_edits=n_edits,
         longest_gaps=tuple(
             dataclasses.replace(gap, first=d.first_frame + gap.first, last=d.first_frame + gap.last)
             for gap in longest
@@ -216,7 +211,7 @@ def summarize(result: am.tracking.Tracked, *, out: Path, method: str, seconds: f
         places=len(places),
         expected_wrong=sum(place.expected_wrong for place in places),
         info=info,
-        shared=shared_figures(tracks) if result.recipe.options.get("rigid") else None,
+        shared=shared_evidence(tracks, recipe.model) if recipe.options.get("rigid") else None,
         naming=None if naming is None else naming_figures(naming),
         filled=None
         if filling is None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import Annotated
 
@@ -35,7 +36,8 @@ def estimate(
 ) -> None:
     """Estimate the tracking model of a capture: noise, motion, detection and clutter.
 
-    The table lists each parameter with its source. `asterism track --model` uses the file.
+    The table lists each parameter with its source, and how large the acceleration is that markers
+    have in common. `asterism track --model` uses the file.
 
     For example:
 
@@ -50,6 +52,7 @@ def estimate(
     import asterism as am
     from asterism.cli.outputs import check_ending, check_outputs
     from asterism.io.atomic import write_text
+    from asterism.reporting.shared_evidence import capture_evidence
 
     check_ending("--out", out, ".toml")
     check_outputs({"--out": out}, [source], overwrite=overwrite)
@@ -62,10 +65,17 @@ def estimate(
         )
     if out is not None:
         write_text(out, found.model.to_toml())
+    if quiet and not json:
+        return
+    with progress("comparing accelerations"):
+        shared = capture_evidence(capture, found.model)
     if json:
         reasons = [{"parameter": p, "value": v, "why": why} for p, v, why in found.reasons]
-        print_json({"model": found.model.to_dict(), "stds": found.stds, "reasons": reasons})
-    elif not quiet:
-        print_table(found.reasons, ("parameter", "value", "why"))
+        plain = None if shared is None else dataclasses.asdict(shared)
+        model = found.model.to_dict()
+        print_json({"model": model, "stds": found.stds, "reasons": reasons, "shared": plain})
+    else:
+        common = [] if shared is None else [("shared acceleration", shared.value, shared.why)]
+        print_table([*found.reasons, *common], ("parameter", "value", "why"))
         if out is not None:
             print_table([("written", out)])

@@ -12,6 +12,7 @@ from asterism.cli.console import Json, Quiet, print_json, print_table
 
 if TYPE_CHECKING:
     import asterism as am
+    from asterism.reporting.shared_evidence import SharedEvidence
 
 _Files = Annotated[list[Path], typer.Argument(metavar="FILE", help="Captures to describe.")]
 
@@ -19,7 +20,8 @@ _Files = Annotated[list[Path], typer.Argument(metavar="FILE", help="Captures to 
 def info(files: _Files, quiet: Quiet = False, json: Json = False) -> None:
     """Describe a capture: markers, gaps, motion, warnings and tracking difficulty.
 
-    Nothing is tracked and no file is written. Several captures are one table, a row each; the exit
+    Where the file has tracks, the acceleration is stated that its markers have in common. Nothing
+    is tracked and no file is written. Several captures are one table, a row each; the exit
     code is 1 if one of them cannot be read.
 
     For example:
@@ -31,15 +33,34 @@ def info(files: _Files, quiet: Quiet = False, json: Json = False) -> None:
         asterism info trial.c3d --json
     """
     import asterism as am
+    from asterism.io.captures.files import read_unlogged
 
     if len(files) > 1:
         _print_several(files, quiet=quiet, json=json)
         return
-    found = am.io.describe(am.read(files[0]))
+    # The rows and the JSON hold the warnings of the file.
+    capture = am.read(files[0]) if quiet and not json else read_unlogged(files[0])
+    found = am.io.describe(capture)
     if json:
-        print_json(dataclasses.asdict(found))
+        shared = _shared(capture)
+        plain = None if shared is None else dataclasses.asdict(shared)
+        print_json({**dataclasses.asdict(found), "shared": plain})
     elif not quiet:
-        print_table(_rows(found))
+        print_table(_rows(found, _shared(capture)))
+
+
+def _shared(capture: am.Capture) -> SharedEvidence | None:
+    """Measure how the tracks of the file accelerate together; None where they are too few."""
+    import asterism as am
+    from asterism.reporting.shared_evidence import shared_evidence
+
+    if capture.tracks.n_tracks < 2:
+        return None
+    try:
+        model = am.estimate_model(capture).model
+    except am.ParameterError:  # there are too few links
+        return None
+    return shared_evidence(capture.tracks, model)
 
 
 def _print_several(files: list[Path], *, quiet: bool, json: bool) -> None:
@@ -74,7 +95,7 @@ def _print_several(files: list[Path], *, quiet: bool, json: bool) -> None:
         raise typer.Exit(1)
 
 
-def _rows(found: am.io.CaptureInfo) -> list[tuple[str, str]]:
+def _rows(found: am.io.CaptureInfo, shared: SharedEvidence | None) -> list[tuple[str, str]]:
     f = found
     rows = [
         ("file", f"{f.path} ({f.format}, units {f.units})"),
@@ -100,6 +121,7 @@ def _rows(found: am.io.CaptureInfo) -> list[tuple[str, str]]:
     return [
         *rows,
         ("nearest neighbour", spacing if f.points_max > 1 else "none: at most one point per frame"),
+        *([] if shared is None else shared.rows()),
         ("difficulty", f"{f.difficulty}: {f.reason}"),
         *([("truncated", f.truncated)] if f.truncated else []),
         *(("warning" if i == 0 else "", text) for i, text in enumerate(f.warnings)),

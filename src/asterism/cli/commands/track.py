@@ -153,7 +153,6 @@ def track(
     from asterism.batch.run_folder import Run
     from asterism.cli.outputs import check_ending, check_outputs, read_model
     from asterism.io.captures.files import format_of
-    from asterism.io.captures.rates import fixed_rate
     from asterism.tracking.naming.from_file import read_markers
 
     check_ending("--report", report, ".html", ".htm")
@@ -181,9 +180,7 @@ def track(
     check_number("--seed", seed or 0, above=0, closed=True, integer=True)
     given = None if model is None else read_model(model)
     capture = am.read(source)
-    written = am.io.CAPTURE_FORMATS[chosen_format]
-    if written.has_fixed_rate:
-        fixed_rate(capture, written.extensions[0][1:].upper())
+    am.io.CAPTURE_FORMATS[chosen_format].check(capture)
     stated = [edit for path in edits or [] for edit in am.io.read_edits(path, capture)]
     if job is not None:
         assert repeat is not None
@@ -221,7 +218,7 @@ def track(
     if prints:
         if result.recipe.method != recipe.method:
             print_table([("method", result.recipe.chosen)])
-        rows = [*([("edits", f"{len(stated)} respected")] if stated else []), *summary.rows()]
+        rows = summary.rows()
         rows += [("report", str(report))] if report is not None else []
         print_table(rows, title=f"\nTracked with {result.recipe.method}")
     if json:

@@ -26,6 +26,7 @@ __all__ = [
     "format_to_write",
     "read",
     "read_tracks",
+    "read_unlogged",
     "write",
 ]
 
@@ -71,10 +72,15 @@ def read(path: str | Path, *, format: str | None = None) -> Capture:
     ...
     asterism.errors.FormatError: nowhere.c3d: no such file
     """
+    return _log_warnings(read_unlogged(path, format=format))
+
+
+def read_unlogged(path: str | Path, *, format: str | None = None) -> Capture:
+    """Read a capture as `read`, for a caller that shows `Capture.warnings` itself."""
     path = check_path("path", path)
     asked = None if format is None else _named(format)
     with _about(path):
-        return _log_warnings(_find(path, asked).read(path))
+        return _find(path, asked).read(path)
 
 
 def read_tracks(path: str | Path, *, format: str | None = None) -> Tracks:

@@ -22,7 +22,7 @@ from asterism.tracking.rigidity.shared_size import shared_size
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["learn_shared_acceleration"]
+__all__ = ["fitted_weights", "learn_shared_acceleration"]
 
 MAX_BONDS, MAX_COMPARED = 16, 8
 """Number of steadiest bonds of a marker, and of those by which the frame of its shape is chosen."""
@@ -91,7 +91,7 @@ def learn_shared_acceleration(tracks: Tracks, model: TrackingModel) -> SharedAcc
         weights=np.ones((K, len(COMPONENTS))) / len(COMPONENTS),
     )  # fmt: skip
     densities, _ = shared_densities(tracks, model, shared)
-    weights = _fitted_weights(densities, tracks.labels, K)
+    weights = fitted_weights(densities, tracks.labels, K)
     is_led = (weights[:, :N_OWN].sum(axis=1) < 0.5) & (np.diff(offsets) > 0)
     steadiest = np.array(offsets[:-1])[is_led]
     size, size_std = shared_size(tracks, marker[steadiest], others[steadiest])
@@ -110,10 +110,25 @@ def _usual_frame(
     return int(sums.argmin())
 
 
-def _fitted_weights(
+def fitted_weights(
     densities: NDArray[np.float64], labels: NDArray[np.int64], n_markers: int
 ) -> NDArray[np.float64]:
-    """Return the weights of the components for each marker, which maximise the density."""
+    """Fit the weights of the components for each marker, which maximise the density.
+
+    Parameters
+    ----------
+    densities : ndarray of shape (N, C)
+        Log densities of `shared_densities`; -inf excludes a component.
+    labels : ndarray of int, shape (N,)
+        Marker of each detection.
+    n_markers : int
+        Number of markers K.
+
+    Returns
+    -------
+    ndarray of shape (K, C)
+        Weights with the sum 1 for each marker.
+    """
     n = densities.shape[1]
     has = np.isfinite(densities).sum(axis=1) > 1
     densities, labels = densities[has], labels[has]
