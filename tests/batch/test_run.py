@@ -116,7 +116,7 @@ def test_results_of_other_settings_keep_their_figures(captures, out, capsys):
 @pytest.mark.parametrize("change", ["settings", "marker set", "edits"])
 def test_all_that_determines_a_result_is_in_its_key(captures, change):
     settings, source = am.batch.Settings(report=False), captures / "first" / "walk.c3d"
-    before = am.batch.plan_batch([str(captures)], "out", settings)
+    before, _ = am.batch.plan_batch([str(captures)], "out", settings)
     if change == "settings":
         settings = dataclasses.replace(settings, fill=True)
     elif change == "marker set":
@@ -125,7 +125,7 @@ def test_all_that_determines_a_result_is_in_its_key(captures, change):
     else:
         edits = [am.model.Edit(kind="clutter", at=((3, 0),))]
         am.io.write_edits(captures / "first" / "walk.edits.toml", edits, am.read(source))
-    after = am.batch.plan_batch([str(captures)], "out", settings)
+    after, _ = am.batch.plan_batch([str(captures)], "out", settings)
     changed = {a.job.name for a, b in zip(before, after, strict=True) if a.job.key != b.job.key}
     assert (
         changed
@@ -151,6 +151,9 @@ def test_edits_beside_a_capture_are_respected(captures, tmp_path):
     d = tracks.detections
     at = d.offsets[3] + [tuple(p) for p in d.frame(3)].index(tuple(am.read(source).frame(3)[0]))
     assert tracks.labels[at] == -1
+    assert "1 respected" in (tmp_path / "out" / "walk.tracked.html").read_text(encoding="utf-8")
+    of_run = tmp_path / "out" / "runs" / "walk.c3d" / "summary.json"
+    assert json.loads(of_run.read_text(encoding="utf-8"))["n_edits"] == 1
 
 
 def test_a_stopped_batch_is_resumed(made_captures, serial, tmp_path):
@@ -191,7 +194,7 @@ def test_the_memory_of_a_capture_is_its_own(captures, tmp_path):
 
 
 def test_an_input_that_changes_in_between_is_refused(captures, tmp_path):
-    plan = am.batch.plan_batch([str(captures / "first")], "out", am.batch.Settings())
+    plan, _ = am.batch.plan_batch([str(captures / "first")], "out", am.batch.Settings())
     job = next(each.job for each in plan if each.job.name == "walk.c3d")
     (captures / "first" / "walk.c3d").write_bytes((captures / "second" / "walk.c3d").read_bytes())
     outcome = perform(job, str(tmp_path / "out"))
@@ -205,17 +208,15 @@ def test_each_method_has_a_key(captures, method):
     settings = am.batch.Settings(method=method, options=options_of(made))
     default = am.batch.Settings(method=method)
     for given in (settings, default):
-        plan = am.batch.plan_batch([str(captures / "first" / "walk.c3d")], "out", given)
+        plan, _ = am.batch.plan_batch([str(captures / "first" / "walk.c3d")], "out", given)
         assert len(plan[0].job.key) == 64
 
 
 def test_what_cannot_be_read_is_reported(captures, tmp_path):
     for name in ("gone.csv", "lost.c3d"):
         (captures / "first" / name).symlink_to(captures / "nowhere")
-    states = {
-        each.job.name: (each.state, each.reason)
-        for each in am.batch.plan_batch([str(captures)], "out", am.batch.Settings())
-    }
+    planned, _ = am.batch.plan_batch([str(captures)], "out", am.batch.Settings())
+    states = {each.job.name: (each.state, each.reason) for each in planned}
     for name in ("first/gone.csv", "first/lost.c3d"):
         assert states[name][0] == "failed"
         assert "no such file" in states[name][1]
@@ -231,7 +232,7 @@ def test_a_folder_that_cannot_be_listed_is_reported(captures, monkeypatch):
         return listed(path)
 
     monkeypatch.setattr(os, "scandir", scandir)
-    planned = am.batch.plan_batch([str(captures)], "out", am.batch.Settings())
+    planned, _ = am.batch.plan_batch([str(captures)], "out", am.batch.Settings())
     states = {each.job.name: (each.state, each.reason) for each in planned}
     assert states["first"] == ("failed", f"{closed}: Permission denied")
     assert states["second/walk.c3d"][0] == "new"
@@ -334,7 +335,7 @@ def test_files_that_are_no_captures_are_listed(captures, others, protocol, monke
 
     monkeypatch.setattr(find, "read_bytes", read_bytes)
     sources, sets = [f"{protocol}{captures}"], [f"{protocol}{captures}/second/other.toml"]
-    planned, left_out = find.survey(sources, "out", am.batch.Settings(), markers=sets)
+    planned, left_out = am.batch.plan_batch(sources, "out", am.batch.Settings(), markers=sets)
     assert len(planned) == 4
     unused = [f"{captures}/first/markers.toml"]  # the given set is used in its place
     assert sorted(left_out) == sorted(f"{protocol}{each}" for each in others + unused)
@@ -374,7 +375,7 @@ def test_the_output_is_another_folder_than_the_input(captures, capsys):
     # A pattern such as captures/* matches an output folder in it too.
     places = [str(captures / "first"), str(captures / "out")]
     (captures / "out").mkdir()
-    assert len(am.batch.plan_batch(places, places[1], am.batch.Settings())) == 2
+    assert len(am.batch.plan_batch(places, places[1], am.batch.Settings())[0]) == 2
     pytest.importorskip("fsspec", reason="needs the extra cluster")
     with pytest.raises(ParameterError, match="another folder than the input"):
         am.batch.run([f"file://{captures}/"], f"file://{captures}")
@@ -390,7 +391,7 @@ def test_results_inside_the_folder_are_no_captures(captures):
     out = captures / "first" / "out"
     shutil.copytree(captures / "second", out)
     shutil.copy(captures / "first" / "walk.c3d", captures / "first" / "walk.tracked.c3d")
-    planned = am.batch.plan_batch([str(captures / "first")], str(out), am.batch.Settings())
+    planned, _ = am.batch.plan_batch([str(captures / "first")], str(out), am.batch.Settings())
     assert [each.job.name for each in planned] == ["turn.csv", "walk.c3d"]
 
 

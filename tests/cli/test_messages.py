@@ -42,16 +42,66 @@ def test_every_command_warns_of_a_unit_that_cannot_be(command, walk, monkeypatch
     assert "unit" in said.lower()
 
 
-def test_two_axes_are_refused_before_the_tracking(tmp_path, capsys, monkeypatch):
+WORK = {
+    "asterism": ("name_tracks", "stitch", "estimate_model", "fill_gaps"),
+    "asterism.tracking": ("plan_tracking",),
+    "asterism.multiview": ("estimate_images",),
+    "asterism.simulate": ("corrupt",),
+    "asterism.cli.filming": ("film_all",),
+}
+
+
+@pytest.fixture
+def flat(tmp_path, monkeypatch):
+    """A folder with tracks of 2-D points and image points at uneven times, where no work begins."""
     rng = np.random.default_rng(1)
-    d = am.Detections(
-        times=np.arange(60) / 100, offsets=np.arange(61), points=rng.normal(0, 0.01, (60, 2))
-    )
-    am.write(d, tmp_path / "flat.csv")
-    monkeypatch.setattr(am.tracking, "plan_tracking", lambda *_, **__: pytest.fail("too late"))
+    times, labels = np.arange(60) / 100, np.zeros(60, dtype=int)
+    for name, axes, at in (("flat", 2, times), ("uneven", 3, times**2)):
+        d = am.Detections(
+            times=at, offsets=np.arange(61), points=rng.normal(0, 0.01, (60, axes))
+        )  # fmt: skip
+        am.write(am.Tracks(detections=d, labels=labels, names=("one",)), tmp_path / f"{name}.csv")
+    rig = am.Rig.ring(2, radius=5, height=2)
+    am.io.write_rig(rig, tmp_path / "rig.toml")
+    filmed = am.simulate.film(am.io.read_tracks(tmp_path / "uneven.csv"), rig)
+    am.io.write_observations(filmed.observations, tmp_path / "seen.csv")
+    for module, names in WORK.items():
+        for name in names:
+            monkeypatch.setattr(f"{module}.{name}", lambda *_, **__: pytest.fail("too late"))
     monkeypatch.chdir(tmp_path)
-    assert main(["track", "flat.csv", "-o", "flat.c3d"]) == 2
-    assert "3-D points, because C3D holds no others" in capsys.readouterr().err
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "track flat.csv -o out.c3d",
+        "name flat.csv -o out.c3d",
+        "stitch flat.csv -o out.c3d",
+        "fill flat.csv -o out.c3d",
+        "edit flat.csv --script flat.edits.toml -o out.c3d",
+        "corrupt flat.csv -o out.c3d --truth truth.csv",
+        "corrupt flat.csv -o out.csv --truth truth.c3d",
+        "serve uneven.csv --labelled --rig ring4 --truth truth.c3d",
+        "reconstruct seen.csv --rig rig.toml -o out.c3d",
+    ],
+)
+def test_what_a_format_cannot_hold_is_refused_before_the_work(command, flat, capsys):
+    (flat / "flat.edits.toml").touch()
+    assert main(command.split()) == 2
+    found = capsys.readouterr().err
+    assert "because C3D h" in found
+    assert {path.name for path in flat.glob("*.c3d")} | {*flat.glob("truth.*")} == set()
+
+
+def test_a_batch_refuses_what_a_format_cannot_hold_before_the_work(flat):
+    stages = []
+    batch = am.batch.run(
+        ["flat.csv"], "out", am.batch.Settings(format="c3d"), workers=1,
+        progress=lambda name, stage, done, of: stages.append(stage),
+    )  # fmt: skip
+    assert "3-D points, because C3D holds no others" in batch.failed["flat.csv"]
+    assert "estimating the model" not in stages
 
 
 def test_a_report_of_a_missing_file_names_the_file(tmp_path, capsys):
@@ -83,3 +133,9 @@ def test_edits_that_were_respected_are_counted(walk, monkeypatch, capsys):
     am.io.write_edits("walk.edits.toml", [edit], capture)
     assert main(["track", "walk.c3d", "--edits", "walk.edits.toml", "-o", "out.c3d"]) == 0
     assert "edits                1 respected" in capsys.readouterr().out
+
+
+def test_without_edits_none_are_counted(walk, monkeypatch, capsys):
+    monkeypatch.chdir(walk)
+    assert main(["track", "walk.c3d", "-o", "out.c3d"]) == 0
+    assert "respected" not in capsys.readouterr().out

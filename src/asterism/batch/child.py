@@ -20,7 +20,7 @@ from asterism.batch.page import write_page
 from asterism.batch.run_folder import CONFIG, DECISIONS, SUMMARY, Run
 from asterism.batch.storage import fetch
 from asterism.errors import AsterismError, ParameterError
-from asterism.io import read, read_edits
+from asterism.io import CAPTURE_FORMATS, read, read_edits
 from asterism.io.atomic import write_text
 from asterism.io.decisions import write_decisions
 from asterism.io.json_text import to_json
@@ -98,6 +98,7 @@ def _track(
             "run the batch again, with the same versions of the software on all machines",
         )  # fmt: skip
     capture = read(at(job.source))
+    CAPTURE_FORMATS[job.format].check(capture)
     sets = [read_markers(at(place)) for place in job.markers] or None
     edits = [] if job.edits is None else read_edits(at(job.edits), capture)
     made = None if settings.method is None else method_by_name(settings.method, **settings.options)

@@ -29,9 +29,7 @@ from asterism.records import record
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-__all__ = [
-    "MARKER_SET", "Planned", "captures_below", "check_apart", "first_of", "plan_batch", "survey",
-]  # fmt: skip
+__all__ = ["MARKER_SET", "Planned", "captures_below", "check_apart", "first_of", "plan_batch"]
 
 MARKER_SET = "markers.toml"
 """Name of the marker set of the captures in a folder and below it."""
@@ -69,14 +67,14 @@ def plan_batch(
     *,
     markers: Sequence[str] = (),
     progress: Callable[[int, int], Any] | None = None,
-) -> list[Planned]:
+) -> tuple[list[Planned], list[str]]:
     """Find the captures of a batch and the state of each result; nothing is tracked.
 
     Parameters
     ----------
     sources : sequence of str
         Captures and folders, by path or URL. In folders, files of the known formats are captures,
-        but for results such as ``trial.tracked.c3d``. `survey` returns the other files too.
+        but for results such as ``trial.tracked.c3d``.
     out : str
         Output folder, by path or URL; captures inside it are left out.
     settings : Settings
@@ -89,37 +87,8 @@ def plan_batch(
 
     Returns
     -------
-    list of Planned
-        In the order of the sources, those of a folder by name.
-
-    Raises
-    ------
-    ParameterError
-        If no capture is found, all sources are in the output folder, or two captures have the same
-        result.
-    """
-    return survey(sources, out, settings, markers=markers, progress=progress)[0]
-
-
-def survey(
-    sources: Sequence[str],
-    out: str,
-    settings: Settings,
-    *,
-    markers: Sequence[str] = (),
-    progress: Callable[[int, int], Any] | None = None,
-) -> tuple[list[Planned], list[str]]:
-    """Find the captures of a batch as `plan_batch`, and the files that are not recognised as such.
-
-    Parameters
-    ----------
-    sources, out, settings, markers, progress
-        As in `plan_batch`.
-
-    Returns
-    -------
     planned : list of Planned
-        The captures, as of `plan_batch`.
+        The captures, in the order of the sources, those of a folder by name.
     left_out : list of str
         Other files of the folders, by path or URL, those with the ending of a capture first. Hidden
         files, results of this program, and marker sets and edits of the batch are not among them.
@@ -127,7 +96,8 @@ def survey(
     Raises
     ------
     ParameterError
-        As in `plan_batch`.
+        If no capture is found, all sources are in the output folder, or two captures have the same
+        result.
     """
     check_apart(sources, out)
     every: dict[str, tuple[Job, str]] = {}

@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from asterism.batch.find import check_apart, survey
+from asterism.batch.find import check_apart, plan_batch
 from asterism.batch.index import holds_batch, write_index
 from asterism.batch.job import Settings
 from asterism.batch.perform import Outcome, deliver_all, perform
@@ -180,7 +180,7 @@ def run(
     check_apart(captures, place)
     if not is_url(place):
         check_folder(place, "a batch", allowed=overwrite or holds_batch(place))
-    planned, left_out = survey(
+    planned, left_out = plan_batch(
         captures, place, settings, markers=[str(m) for m in markers],
         progress=None if progress is None else lambda n, of: progress("", "examining", n, of),
     )  # fmt: skip

@@ -67,7 +67,8 @@ def _diagnose(error: Any, message: str) -> None:
         check_fields(_command(error), [missing[1]], command.commands)
     surplus = re.search(r"unexpected extra argument.*? \((.*)\)", message)
     if surplus is not None:
-        raise ParameterError(_command(error), "no more arguments", repr(surplus[1]))
+        hint = f"see asterism {_command(error)} --help"
+        raise ParameterError(_command(error), "no more arguments", repr(surplus[1]), hint)
     parameter = getattr(error, "param", None)
     if parameter is None:
         return

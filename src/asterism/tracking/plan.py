@@ -5,9 +5,11 @@ from __future__ import annotations
 import hashlib
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+
 from asterism.checks import check_kind, check_number
 from asterism.errors import ParameterError
-from asterism.model import Capture, Detections, Edit, MarkerSet, Recipe, TrackingModel
+from asterism.model import Capture, Detections, Edit, MarkerSet, Recipe, TrackingModel, Tracks
 from asterism.model.recipe import InputHash, hash_of_edits, versions
 from asterism.records import record
 from asterism.tracking.choose import choose_method
@@ -18,7 +20,6 @@ from asterism.tracking.naming.own_names import has_own_names
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from asterism.model import Tracks
     from asterism.tracking.estimation import ModelEstimate
 
 __all__ = ["Plan", "hash_of_names", "plan_tracking"]
@@ -78,7 +79,7 @@ def plan_tracking(
     seed : int, optional
         Seed of the methods that draw random numbers; 0 by default.
     start : Tracks, optional
-        Initial tracks, which `MCMCDA` repairs.
+        Initial tracks of the same detections, which `MCMCDA` repairs.
     marker_sets : sequence of MarkerSet, optional
         Marker sets by which the tracks are named, as for `track`; by default the own names of a
         `Capture`, if it has any.
@@ -95,7 +96,8 @@ def plan_tracking(
     Raises
     ------
     ParameterError
-        If no model can be estimated, or an argument has the wrong type.
+        If no model can be estimated, an argument has the wrong type, or the initial tracks are of
+        other detections.
 
     Examples
     --------
@@ -111,6 +113,8 @@ def plan_tracking(
         check_number("seed", seed, above=0, closed=True, integer=True)
     if method is not None:  # checked before the slow estimation of the model
         method = _checked(method)
+    if start is not None:
+        _check_start(start, detections)
     for each in edits:
         check_kind("edits", each, Edit, "asterism.io.read_edits(path, detections)")
     estimate = None
@@ -141,6 +145,26 @@ def plan_tracking(
         retry=is_chosen and stitch is True and start is None,
     )
     return Plan(recipe=recipe, method=method, estimate=estimate)
+
+
+def _check_start(start: Tracks, detections: Detections) -> None:
+    """Raise unless initial tracks have as many detections in each frame."""
+    check_kind("start", start, Tracks, "am.Tracks(detections=…, labels=…)")
+    own, given = start.detections, detections
+    if np.array_equal(own.offsets, given.offsets):
+        return
+    expected, found = _size_of(given), _size_of(own)
+    if (own.n_frames, own.n_points) == (given.n_frames, given.n_points):
+        t = int(np.argmax(own.counts != given.counts))
+        expected, found = f"{expected}, {given.counts[t]} in frame {t}", f"{found}, {own.counts[t]}"
+    hint = "give tracks of the capture that is tracked, as from am.read(path).tracks"
+    raise ParameterError("start", f"tracks of the same detections: {expected}", found, hint)
+
+
+def _size_of(detections: Detections) -> str:
+    """Return the number of frames and detections, with the file of a capture."""
+    size = f"{detections.n_frames} frames with {detections.n_points} detections"
+    return f"{size} in {detections.path}" if isinstance(detections, Capture) else size
 
 
 def hash_of_names(detections: Detections, marker_sets: Sequence[MarkerSet] | None) -> str:

@@ -105,7 +105,7 @@ def batch(
         asterism batch captures -o tracked --scheduler tcp://node1:8786
     """
     import asterism as am
-    from asterism.batch.find import check_apart, survey
+    from asterism.batch.find import check_apart
     from asterism.batch.index import holds_batch
     from asterism.batch.storage import is_url
     from asterism.checks import check_number
@@ -128,7 +128,7 @@ def batch(
         seed=seed, fill=fill, report=not no_report, format=format,
     )  # fmt: skip
     if dry_run:
-        planned, left_out = survey(sources, out, settings, markers=markers or [])
+        planned, left_out = am.batch.plan_batch(sources, out, settings, markers=markers or [])
         _print_plan(planned, left_out, quiet=quiet, json=json)
         return
     with _shown() as show:

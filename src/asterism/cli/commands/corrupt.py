@@ -85,10 +85,10 @@ def corrupt(
     from asterism.io.captures.files import format_to_write
     from asterism.simulate import Burst, Ghosts
 
-    with as_options({"path": "--out"}):
-        format_to_write(out, None)
-    with as_options({"path": "--truth"}):
-        format_to_write(truth, None)
+    formats: list[am.io.CaptureFormat] = []
+    for name, path in {"--out": out, "--truth": truth}.items():
+        with as_options({"path": name}):
+            formats.append(format_to_write(path, None))
     check_outputs({"--out": out, "--truth": truth}, [source], overwrite=overwrite)
     occlusions = None if burst is None else episode("--burst", Burst, burst)
     ghost_episodes = None if ghosts is None else episode("--ghosts", Ghosts, ghosts)
@@ -97,6 +97,8 @@ def corrupt(
     if not known.n_tracks:
         expected = "a capture whose markers are labelled"
         raise ParameterError("IN", expected, f"{source}, which has no labels")
+    for each in formats:
+        each.check(known.detections)
     switches: dict[str, Any] = {
         "missing": missing,
         "clutter": clutter,

@@ -110,7 +110,7 @@ def edit(
         name = output_format(None, None, format_of(source).name)
         ending = am.io.CAPTURE_FORMATS[name].extensions[0]
         out = source.with_name(f"{source.stem}.corrected{ending}")
-    output_format(out, None)
+    format = output_format(out, None)
     inputs = [source, script, *(markers or [])]
     path = edits or script or source.with_name(f"{source.stem}.edits.toml")
     if script is None and path.is_file() and out.is_file() and not overwrite:
@@ -121,7 +121,7 @@ def edit(
         raise ParameterError("--script", "a file of edits", f"{script}, which does not exist")
     if edits is not None:
         check_outputs({"--edits": edits}, [source, out, *(markers or [])], overwrite=True)
-    session, sets = _session(source, path, recipe, markers, method, seed)
+    session, sets = _session(source, path, format, recipe, markers, method, seed)
     if script is not None:
         with progress("writing the result"):
             session.save(out, overwrite=overwrite)
@@ -153,6 +153,7 @@ def edit(
 def _session(
     source: Path,
     path: Path,
+    format: str,
     recipe: Recipe | None,
     markers: list[Path] | None,
     method: str | None,
@@ -167,6 +168,7 @@ def _session(
     chosen = made_method(method, [])
     sets = [read_markers(each) for each in markers] if markers else None
     capture = am.read(source)
+    am.io.CAPTURE_FORMATS[format].check(capture)
     if path.exists():
         am.io.read_edits(path, capture)  # an error comes before the tracking
     if recipe is None:

@@ -77,6 +77,7 @@ def fill(
         raise ParameterError(
             "IN", "a capture with tracks", f"none in {source}", "run asterism track first"
         )
+    am.io.CAPTURE_FORMATS[format].check(capture)
     given = None if model is None else read_model(model)
     with progress("filling") as advance:
         found = am.fill_gaps(tracks, model=given, longest=longest, progress=advance)

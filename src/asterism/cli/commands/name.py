@@ -63,6 +63,7 @@ def name(
     if not (capture.labels >= 0).any():
         hint = "run asterism track first"
         raise ParameterError("IN", "a capture with tracks", f"none in {source}", hint)
+    am.io.CAPTURE_FORMATS[format].check(capture)
     tracks = capture.tracks.measured()
     if not sets and not has_own_names(capture):
         raise ParameterError("--markers", "a marker set", f"none, and no names in {source}")

@@ -89,6 +89,12 @@ def reconstruct(
     observations = am.io.read_observations(source)
     if truth is not None and observations.markers is None:
         raise ParameterError("--truth", "image points with their markers", f"none in {source}")
+    times = observations.times
+    empty = am.Detections(
+        times=times, offsets=np.zeros(len(times) + 1, dtype=np.int64), points=np.empty((0, 3))
+    )
+    for format in formats.values():
+        am.io.CAPTURE_FORMATS[format].check(empty)
     cameras = am.read_rig(rig)
     for warning in cameras.warnings:
         log.warning("%s: %s", rig, warning)

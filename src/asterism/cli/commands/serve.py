@@ -155,6 +155,8 @@ def serve(
         capture, scene, given, option or [], corruption or [], seed,
         labelled=labelled, is_seeing=bool(seeing),
     )  # fmt: skip
+    if save is not None:
+        format_to_write(save, None).check(tracks.detections)
     cameras, observations = None, None
     if rig is not None:
         cameras, about["rig"], observations = _filmed(tracks, rig, seeing or [], seed or 0)

@@ -67,6 +67,7 @@ def stitch(
     if not (capture.labels >= 0).any():
         hint = "run asterism track --stitch first"
         raise ParameterError("IN", "a capture with tracks", f"none in {source}", hint)
+    am.io.CAPTURE_FORMATS[format].check(capture)
     if model is None:
         with progress("estimating the model"):
             given = am.estimate_model(capture).model

@@ -14,15 +14,29 @@ from asterism.io.captures import (
     qtm_tsv,
     trc,
 )
+from asterism.io.captures.rates import fixed_rate
 from asterism.records import Registry, record
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from asterism.model import Capture, Tracks
+    from asterism.model import Capture, Detections, Tracks
 
 __all__ = ["CAPTURE_FORMATS", "CaptureFormat"]
+
+
+def _holds_any(detections: Detections) -> None:
+    """Accept detections of any axes and times."""
+
+
+def _has_fixed_rate(format_name: str) -> Callable[[Detections], object]:
+    """Return the check for 3-D points at a fixed rate, with the name of a format for messages."""
+
+    def has_fixed_rate(detections: Detections) -> None:
+        fixed_rate(detections, format_name)
+
+    return has_fixed_rate
 
 
 @record
@@ -47,8 +61,9 @@ class CaptureFormat:
         Function from a path to `Tracks`, for a format that holds more than a `Capture`.
     keeps_filled : bool
         Whether the format marks filled points.
-    has_fixed_rate : bool
-        Whether it holds only 3-D points at a fixed rate (`fixed_rate`).
+    check : callable
+        Function that raises `ParameterError` unless the format can hold the axes and the times of
+        `Detections`. A command calls it before long work whose result it writes.
 
     Examples
     --------
@@ -65,7 +80,7 @@ class CaptureFormat:
     write: Callable[[Tracks, IO[bytes]], None] | None = None
     read_tracks: Callable[[Path], Tracks] | None = None
     keeps_filled: bool = False
-    has_fixed_rate: bool = False
+    check: Callable[[Detections], object] = _holds_any
 
 
 CAPTURE_FORMATS: dict[str, CaptureFormat] = Registry(
@@ -79,7 +94,7 @@ CAPTURE_FORMATS: dict[str, CaptureFormat] = Registry(
             read=c3d.read,
             write=c3d_write.write,
             keeps_filled=True,
-            has_fixed_rate=True,
+            check=_has_fixed_rate("C3D"),
         ),
         CaptureFormat(
             name="trc",
@@ -88,7 +103,7 @@ CAPTURE_FORMATS: dict[str, CaptureFormat] = Registry(
             sniff=trc.sniff,
             read=trc.read,
             write=trc.write,
-            has_fixed_rate=True,
+            check=_has_fixed_rate("TRC"),
         ),
         CaptureFormat(
             name="csv",
@@ -122,7 +137,7 @@ CAPTURE_FORMATS: dict[str, CaptureFormat] = Registry(
             sniff=qtm_tsv.sniff,
             read=qtm_tsv.read,
             write=qtm_tsv.write,
-            has_fixed_rate=True,
+            check=_has_fixed_rate("TSV"),
         ),
         CaptureFormat(
             name="pointcloud",
@@ -131,6 +146,7 @@ CAPTURE_FORMATS: dict[str, CaptureFormat] = Registry(
             sniff=pointcloud.sniff,
             read=pointcloud.read,
             write=pointcloud.write,
+            check=pointcloud.check,
         ),
     )
 )

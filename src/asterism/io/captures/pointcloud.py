@@ -17,9 +17,9 @@ from asterism.model import Capture
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from asterism.model import Tracks
+    from asterism.model import Detections, Tracks
 
-__all__ = ["read", "sniff", "write"]
+__all__ = ["check", "read", "sniff", "write"]
 
 _RECORD = struct.Struct("<II")
 _POINT = 12  # bytes
@@ -149,16 +149,33 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
     520
     """
     d = tracks.detections
-    if d.n_axes != 3:
-        hint = "write CSV, which takes 2-D points"
-        raise ParameterError("tracks", "3-D points, because the log holds no others", "2-D", hint)
+    check(d)
     milliseconds = np.round(d.times * 1000)
-    if len(d.times) and (
-        milliseconds[0] < 0 or milliseconds[-1] >= 2**32 or (np.diff(milliseconds) <= 0).any()
-    ):
-        expected = "times of at least 0 that differ by a millisecond or more"
-        raise ParameterError("times", expected, "others", "write CSV, which keeps any times")
     points = to_float32(d.points)
     for t, time in enumerate(milliseconds.astype(np.int64).tolist()):
         begin, end = int(d.offsets[t]), int(d.offsets[t + 1])
         file.write(_RECORD.pack(time, end - begin) + points[begin:end].tobytes())
+
+
+def check(detections: Detections) -> None:
+    """Raise unless a log can hold points of these axes and times.
+
+    Parameters
+    ----------
+    detections : Detections
+        Points to write.
+
+    Raises
+    ------
+    ParameterError
+        If the points are 2-D, or the times are negative or nearer than a millisecond.
+    """
+    if detections.n_axes != 3:
+        hint = "write CSV, which takes 2-D points"
+        raise ParameterError("tracks", "3-D points, because the log holds no others", "2-D", hint)
+    milliseconds = np.round(detections.times * 1000)
+    if len(milliseconds) and (
+        milliseconds[0] < 0 or milliseconds[-1] >= 2**32 or (np.diff(milliseconds) <= 0).any()
+    ):
+        expected = "times of at least 0 that differ by a millisecond or more"
+        raise ParameterError("times", expected, "others", "write CSV, which keeps any times")
