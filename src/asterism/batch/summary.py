@@ -181,6 +181,8 @@ def summarize(
     """
     tracks, naming, filling = result.tracks.measured(), result.naming, result.filling
     recipe = result.recipe
+    # Without a common motion the model is that of the rest.
+    has_bonds = recipe.options.get("rigid") is not None and not recipe.common_motion
     d = tracks.detections
     assert isinstance(d, am.Capture)
     places = places_of(tracks)
@@ -211,7 +213,7 @@ def summarize(
         places=len(places),
         expected_wrong=sum(place.expected_wrong for place in places),
         info=info,
-        shared=shared_evidence(tracks, recipe.model) if recipe.options.get("rigid") else None,
+        shared=shared_evidence(tracks, recipe.model) if has_bonds else None,
         naming=None if naming is None else naming_figures(naming),
         filled=None
         if filling is None

@@ -56,7 +56,7 @@ class Session:
 
     def __init__(self, begun: Uncorrected, path: Path, who: str = "") -> None:
         self.begun, self.path, self.who = begun, path, who
-        self._correction = Correction(begun.tracks, begun.model, begun.stitching)
+        self._correction = Correction(begun.as_modelled(begun.tracks), begun.model, begun.stitching)
         self._undone: list[Edit] = []
         self._sha256 = sha256_of(begun.tracks.detections)
 
@@ -117,7 +117,7 @@ class Session:
     @property
     def tracks(self) -> Tracks:
         """Tracks now; numbers stay the same, and emptied tracks have no detection."""
-        return self._correction.tracks
+        return self.begun.as_captured(self._correction.tracks)
 
     @property
     def edits(self) -> tuple[Edit, ...]:
@@ -291,7 +291,7 @@ class Session:
     def decisions(self) -> tuple[Decision, ...]:
         """Return the uncertain identities and names, by falling expected wrong detections."""
         found = settled(
-            assess(self.tracks, self.begun.model, self.begun.stitching), self.edits
+            assess(self._correction.tracks, self.begun.model, self.begun.stitching), self.edits
         ).decisions
         return tuple(sorted(found, key=lambda each: -each.expected_wrong))
 
@@ -316,7 +316,7 @@ class Session:
         """
         edit = self.fill(track, first, last)
         tracks = fill_gaps(
-            self.tracks, model=self.begun.recipe.model, longest=0.0, edits=(edit,)
+            self.tracks, model=self.begun.capture_model, longest=0.0, edits=(edit,)
         ).tracks
         d = tracks.detections
         if d.filled is None or d.stds is None:

@@ -107,6 +107,9 @@ class Recipe:
     passes : int
         Number of passes of the method over the capture. Before each further pass it learns bonds
         from the tracks of the pass before.
+    common_motion : bool
+        Whether the motion that all markers have in common is removed before (
+        `asterism.tracking.without_common_motion`). The model is then that of the rest.
 
     Examples
     --------
@@ -135,6 +138,7 @@ class Recipe:
     versions: dict[str, str]
     retry: bool = False
     passes: int = 1
+    common_motion: bool = False
 
     @property
     def sha256(self) -> str:
@@ -173,6 +177,7 @@ class Recipe:
                 "stitch": self.stitch,
                 "retry": self.retry,
                 "passes": self.passes,
+                "common_motion": self.common_motion,
                 **({"reason": self.reason} if self.reason else {}),
                 # TOML has no null value.
                 "options": _replaced(self.options, None, NONE),
@@ -207,7 +212,17 @@ class Recipe:
         check_fields("recipe", map(str, values), sections)
         method, names = _table(values, "method"), _table(values, "names")
         check_fields("names", map(str, names), ("markers", "edits", "fill"))
-        keys = ("name", "seed", "start", "stitch", "retry", "passes", "reason", "options")
+        keys = (
+            "name",
+            "seed",
+            "start",
+            "stitch",
+            "retry",
+            "passes",
+            "common_motion",
+            "reason",
+            "options",
+        )
         check_fields("method", map(str, method), keys)
         if (seed := method.get("seed")) is not None:
             check_number("method.seed", seed, above=0, closed=True, integer=True)
@@ -228,6 +243,7 @@ class Recipe:
             versions={str(k): str(v) for k, v in _table(values, "versions").items()},
             retry=_value({"retry": False, **method}, "method.retry", bool),
             passes=passes,
+            common_motion=_value({"common_motion": False, **method}, "method.common_motion", bool),
         )
 
 

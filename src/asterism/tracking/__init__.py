@@ -3,7 +3,7 @@
 from asterism.tracking.choose import AUTO, Choice, choose_method
 from asterism.tracking.confidence import assess
 from asterism.tracking.correction import Change, Correction, Stretch, correct
-from asterism.tracking.estimation import ModelEstimate, estimate_model
+from asterism.tracking.estimation import ModelEstimate, estimate_model, without_common_motion
 from asterism.tracking.filling import FilledGap, Filling, fill_gaps
 from asterism.tracking.history import TrackHistory, track_states
 from asterism.tracking.methods import (
@@ -93,4 +93,5 @@ __all__ = [
     "track",
     "track_states",
     "tracklet_model",
+    "without_common_motion",
 ]

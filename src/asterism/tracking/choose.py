@@ -7,6 +7,7 @@ the association was ambiguous. The documentation (`Which method when`) measures 
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +15,9 @@ import numpy as np
 
 from asterism.checks import check_kind
 from asterism.model import Detections, RandomWalk, TrackingModel, Tracks
+from asterism.model.posterior import track_scores
 from asterism.records import record
-from asterism.tracking.estimation import fit_body_motion
+from asterism.tracking.estimation import estimate_model, fit_body_motion, without_common_motion
 from asterism.tracking.methods.gnn import GNN
 from asterism.tracking.methods.mcmcda import MCMCDA
 from asterism.tracking.methods.options import Rigidity
@@ -25,6 +27,7 @@ from asterism.tracking.rigidity.distances import MIN_TOGETHER, distances_from
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from asterism.tracking.estimation import ModelEstimate
     from asterism.tracking.methods.base import Method
 
 __all__ = ["AUTO", "Choice", "choose_method"]
@@ -51,7 +54,9 @@ CLEAR = 0.01
 
 CONFUSED = 1.0
 """Smallest number of rival detections per link at which the tracks of GNN do not tell whether there
-are bodies, so that `fit_body_motion` does."""
+are bodies, so that `fit_body_motion` does, and at which a motion in common is searched for."""
+MAX_COMPARED = 20_000
+"""Number of detections at the beginning of a capture that show whether there is one."""
 
 
 @record
@@ -66,6 +71,9 @@ class Choice:
         Whether the tracklets of the method are to be stitched.
     reason : str
         What was measured in the capture and what follows from it, in one line.
+    estimate : ModelEstimate, optional
+        Model of the capture without the motion that its markers have in common, if it is to be
+        tracked without (`without_common_motion`).
 
     Examples
     --------
@@ -81,10 +89,15 @@ class Choice:
     method: Method[Any]
     stitch: bool
     reason: str
+    estimate: ModelEstimate | None = None
 
 
 def choose_method(
-    detections: Detections, model: TrackingModel, *, has_start: bool = False
+    detections: Detections,
+    model: TrackingModel,
+    *,
+    has_start: bool = False,
+    is_estimated: bool = True,
 ) -> Choice:
     """Select a method from measured properties of a capture.
 
@@ -95,6 +108,11 @@ def choose_method(
     - Markers that move by a random walk, or that enter each other's gates: `MCMCDA`.
     - Any other capture is unambiguous: `GNN`.
 
+    Where every link has a rival, the same is measured without the motion that all markers have in
+    common. The capture is tracked so if no bodies are lost and the detections are more probable by
+    more than this motion costs: half the logarithm of the number of detections of a frame for each
+    of its coordinates and angles (BIC).
+
     Parameters
     ----------
     detections : Detections
@@ -103,6 +121,8 @@ def choose_method(
         Tracking model of the capture, with which GNN tracks it once.
     has_start : bool
         Whether the tracking starts from given tracks; then nothing is measured.
+    is_estimated : bool
+        Whether the model is estimated. A given one holds for the capture as it is.
 
     Returns
     -------
@@ -128,29 +148,75 @@ def choose_method(
     if has_start:
         return Choice(method=MCMCDA(), stitch=False, reason="initial tracks are given")
     detections = detections.measured()
-    method = GNN()
-    state, labels, _ = method.run(method.init(model, n_axes=detections.n_axes), detections)
-    labels.flags.writeable = False  # no other object refers to it: no need to copy
-    tracks = Tracks(detections=detections, labels=labels)
+    tracks, rivals = _quick_tracks(detections, model)
+    choice = _as_it_is(tracks, model, rivals)
+    if is_estimated and rivals > CONFUSED:
+        together = _without_common(detections, model)
+        # Bodies that move apart are lost without the motion of the largest.
+        if together is not None and together.stitch >= choice.stitch:
+            return together
+    return choice
+
+
+def _as_it_is(tracks: Tracks, model: TrackingModel, rivals: float) -> Choice:
+    """Return the choice for tracks of GNN with this number of rival detections per link."""
     if bodies := _bodies(tracks, model):
         return bodies
     if any(isinstance(mode, RandomWalk) for mode in model.motion.modes):
         return Choice(
             method=MCMCDA(), stitch=False, reason="the motion is a random walk, no bodies"
         )
-    # The ratio is per link, not per detection: the first detection of a track is in no gate, and
-    # short captures consist largely of first detections.
-    n_links = int(tracks.lengths.sum()) - tracks.n_tracks
-    rivals = max(state.info["candidates"] / max(n_links, 1) - 1, 0.0)
     rate = f"{100 * rivals:.1f} rival detections in the gates per 100 links, no bodies"
     if rivals > CLEAR:
         # Markers that move by more than the distance to their neighbours have no stable distances
         # in tracks of GNN.
-        fitted = fit_body_motion(detections, model) if rivals > CONFUSED else None
+        fitted = fit_body_motion(tracks.detections, model) if rivals > CONFUSED else None
         if fitted is not None and (bodies := _bodies(fitted[1], fitted[0])):
             return replace(bodies, method=SMP(window=3, rigid=Rigidity()))
         return Choice(method=MCMCDA(), stitch=False, reason=rate)
-    return Choice(method=method, stitch=False, reason=rate)
+    return Choice(method=GNN(), stitch=False, reason=rate)
+
+
+def _quick_tracks(detections: Detections, model: TrackingModel) -> tuple[Tracks, float]:
+    """Return tracks of GNN, and the number of rival detections per link.
+
+    The number is per link, not per detection: the first detection of a track is in no gate, and
+    short captures consist largely of first detections.
+    """
+    method = GNN()
+    state, labels, _ = method.run(method.init(model, n_axes=detections.n_axes), detections)
+    labels.flags.writeable = False  # no other object refers to it: no need to copy
+    tracks = Tracks(detections=detections, labels=labels)
+    n_links = int(tracks.lengths.sum()) - tracks.n_tracks
+    return tracks, max(state.info["candidates"] / max(n_links, 1) - 1, 0.0)
+
+
+def _without_common(detections: Detections, model: TrackingModel) -> Choice | None:
+    """Return the choice without the motion in common, None if that explains too little."""
+    n_frames = detections.n_frames * MAX_COMPARED // max(detections.n_points, 1)
+    part = detections.part(0, max(min(n_frames, detections.n_frames), MIN_TOGETHER))
+    still = without_common_motion(part)
+    found = _quick_tracks(still, of_still := estimate_model(still).model)[0]
+    gain = _log_density(found, of_still) - _log_density(_quick_tracks(part, model)[0], model)
+    D, T = part.n_axes, part.n_frames
+    cost = T * D * (D + 1) / 2 * 0.5 * math.log(max(part.n_points / T, 1))
+    if gain <= cost:
+        return None
+    whole = without_common_motion(detections)
+    estimate = estimate_model(whole)
+    choice = choose_method(whole, estimate.model, is_estimated=False)
+    reason = (
+        f"without the motion that all markers have in common, detections are more probable by "
+        f"{gain / part.n_points:.2g} nats each, {choice.reason}"
+    )
+    return replace(choice, reason=reason, estimate=estimate)
+
+
+def _log_density(tracks: Tracks, model: TrackingModel) -> float:
+    """Return the log density of all detections, those without a track as clutter."""
+    scores = track_scores(tracks, model)
+    clutter = len(tracks.labels) * math.log(model.sensor.clutter_density)
+    return float(scores[np.isfinite(scores)].sum()) + clutter
 
 
 def _bodies(tracks: Tracks, model: TrackingModel) -> Choice | None:

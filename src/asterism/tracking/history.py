@@ -11,6 +11,7 @@ from asterism.errors import ParameterError
 from asterism.filter import States, smooth_states
 from asterism.model import TrackingModel, Tracks
 from asterism.records import record
+from asterism.tracking.estimation import estimate_model
 from asterism.tracking.methods import TrackStates
 
 if TYPE_CHECKING:
@@ -158,5 +159,7 @@ def track_states(tracks: Tracks, *, model: TrackingModel | None = None) -> Track
         if tracks.recipe is None:
             hint = "pass am.estimate_model(tracks.detections).model"
             raise ParameterError("model", "a model, as the tracks have no recipe", "none", hint)
-        model = tracks.recipe.model
+        recipe = tracks.recipe
+        is_still = recipe.common_motion  # its model is that of the rest of the motion
+        model = estimate_model(tracks.detections).model if is_still else recipe.model
     return TrackHistory(tracks=tracks, states=smooth_states(tracks, model))

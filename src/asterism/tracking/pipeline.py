@@ -14,6 +14,7 @@ from asterism.records import record
 from asterism.tracking.attempts.most_certain import attempt, most_certain
 from asterism.tracking.correction import correct, settled
 from asterism.tracking.decisions import of_filling, of_naming, of_stitching
+from asterism.tracking.estimation import without_common_motion
 from asterism.tracking.filling import LONGEST, fill_gaps
 from asterism.tracking.naming import name_tracks
 from asterism.tracking.plan import hash_of_names, plan_tracking
@@ -223,7 +224,11 @@ def without_edits(
     """
     _warn_of_versions(recipe)
     make = most_certain if recipe.retry else attempt
-    found = make(recipe, detections, method, start=start, progress=progress)
+    seen = without_common_motion(detections) if recipe.common_motion else detections
+    found = make(recipe, seen, method, start=start, progress=progress)
+    if recipe.common_motion:
+        tracks = dataclasses.replace(found.tracks, detections=detections.measured())
+        found = dataclasses.replace(found, tracks=tracks, still=seen)
     if not recipe.markers:
         return found
     naming = name_tracks(found.tracks, *(marker_sets or ()))
@@ -243,8 +248,8 @@ def conclude(begun: Uncorrected, edits: Sequence[Edit] = ()) -> Tracked:
     model, stitching, naming = begun.model, begun.stitching, begun.naming
     recipe = dataclasses.replace(begun.recipe, edits=hash_of_edits(edits))
     if edits:
-        corrected = correct(begun.tracks, edits, model, stitching)
-        begun = dataclasses.replace(begun, tracks=corrected)
+        corrected = correct(begun.as_modelled(begun.tracks), edits, model, stitching)
+        begun = dataclasses.replace(begun, tracks=begun.as_captured(corrected))
     tracks = settled(begun.assessed, edits)
     decisions = tracks.decisions
     if stitching is not None:
@@ -255,7 +260,7 @@ def conclude(begun: Uncorrected, edits: Sequence[Edit] = ()) -> Tracked:
     filling = None
     if is_filled:
         longest = LONGEST if recipe.fill else 0.0  # only the gaps that edits state
-        filling = fill_gaps(tracks, model=recipe.model, edits=edits, longest=longest)
+        filling = fill_gaps(tracks, model=begun.capture_model, edits=edits, longest=longest)
         tracks = filling.tracks
         decisions += of_filling(filling)
     carried = None if tracks.recipe is None else recipe

@@ -13,7 +13,7 @@ from asterism.model import Capture, Detections, Edit, MarkerSet, Recipe, Trackin
 from asterism.model.recipe import InputHash, hash_of_edits, versions
 from asterism.records import record
 from asterism.tracking.choose import choose_method
-from asterism.tracking.estimation import estimate_model
+from asterism.tracking.estimation import estimate_model, without_common_motion
 from asterism.tracking.methods import SMP, Method, method_by_name, options_of
 from asterism.tracking.naming.own_names import has_own_names
 
@@ -117,17 +117,23 @@ def plan_tracking(
         _check_start(start, detections)
     for each in edits:
         check_kind("edits", each, Edit, "asterism.io.read_edits(path, detections)")
-    estimate = None
-    if model is None:
+    estimate, seen = None, detections
+    if model is None and method is None and start is None:
+        estimate, seen = _estimated(detections)
+        model = estimate.model
+    elif model is None:
         estimate = estimate_model(detections)
         model = estimate.model
     check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
-    reason, is_chosen = "", method is None
+    reason, is_chosen, common_motion = "", method is None, seen is not detections
     if method is None and stitch is True and start is None:
         method, reason = SMP(window=3), "stitching is requested"
     elif method is None:
-        choice = choose_method(detections, model, has_start=start is not None)
+        is_estimated = estimate is not None and not common_motion
+        choice = choose_method(seen, model, has_start=start is not None, is_estimated=is_estimated)
         method, reason = choice.method, choice.reason
+        if choice.estimate is not None:
+            common_motion, estimate, model = True, choice.estimate, choice.estimate.model
         stitch = choice.stitch if stitch == "auto" else stitch
     recipe = Recipe(
         method=method.name,
@@ -143,8 +149,25 @@ def plan_tracking(
         input_hash=InputHash((detections, None if start is None else start.labels)),
         versions=versions(),
         retry=is_chosen and stitch is True and start is None,
+        common_motion=common_motion,
     )
     return Plan(recipe=recipe, method=method, estimate=estimate)
+
+
+def _estimated(detections: Detections) -> tuple[ModelEstimate, Detections]:
+    """Return a model and the capture for which it holds.
+
+    Where all markers move so far together that no point can be followed to the next frame, it is
+    the capture without this motion.
+    """
+    try:
+        return estimate_model(detections), detections
+    except ParameterError as error:
+        still = without_common_motion(detections)
+        try:
+            return estimate_model(still), still
+        except ParameterError:
+            raise error from None
 
 
 def _check_start(start: Tracks, detections: Detections) -> None:

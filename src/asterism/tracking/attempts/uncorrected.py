@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -12,9 +13,10 @@ from asterism.tracking.confidence.identity import (
     expected_right,
     with_confidence,
 )
+from asterism.tracking.estimation import estimate_model
 
 if TYPE_CHECKING:
-    from asterism.model import Recipe, TrackingModel, Tracks
+    from asterism.model import Detections, Recipe, TrackingModel, Tracks
     from asterism.tracking.naming import Naming
     from asterism.tracking.stitching import Stitching
 
@@ -41,6 +43,9 @@ class Uncorrected:
         Stitching that made them.
     naming : Naming, optional
         Names with their probabilities.
+    still : Detections, optional
+        The same detections without the motion that all markers have in common, if the model and the
+        stitching are those of this rest.
     """
 
     tracks: Tracks
@@ -48,12 +53,43 @@ class Uncorrected:
     model: TrackingModel
     stitching: Stitching | None = None
     naming: Naming | None = None
+    still: Detections | None = None
+
+    def as_modelled(self, tracks: Tracks) -> Tracks:
+        """Return tracks of the capture in the coordinates for which the model holds.
+
+        Parameters
+        ----------
+        tracks : Tracks
+            Tracks of the same detections.
+        """
+        return tracks if self.still is None else replace(tracks, detections=self.still)
+
+    def as_captured(self, tracks: Tracks) -> Tracks:
+        """Return such tracks in the coordinates of the capture.
+
+        Parameters
+        ----------
+        tracks : Tracks
+            Tracks of the same detections.
+        """
+        if self.still is None:
+            return tracks
+        return replace(tracks, detections=self.tracks.detections)
+
+    @cached_property
+    def capture_model(self) -> TrackingModel:
+        """Model of the capture as it is."""
+        if self.still is None:
+            return self.recipe.model
+        return estimate_model(self.tracks.detections).model
 
     @cached_property
     def examined(self) -> Examined:
         """What the confidence of identities is computed from."""
         threads = self.recipe.options.get("threads", 1)
-        return examine(self.tracks, self.model, self.stitching, threads=threads)
+        tracks = self.as_modelled(self.tracks)
+        return examine(tracks, self.model, self.stitching, threads=threads)
 
     @cached_property
     def assessed(self) -> Tracks:

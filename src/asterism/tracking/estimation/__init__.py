@@ -5,6 +5,7 @@ from asterism.tracking.estimation.body_motion import (
     fit_body_motion,
     fit_to_tracks,
 )
+from asterism.tracking.estimation.common_motion import without_common_motion
 from asterism.tracking.estimation.estimate import estimate_model
 from asterism.tracking.estimation.model_estimate import ModelEstimate
 
@@ -14,4 +15,5 @@ __all__ = [
     "estimate_model",
     "fit_body_motion",
     "fit_to_tracks",
+    "without_common_motion",
 ]

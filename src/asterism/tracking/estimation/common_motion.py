@@ -1,0 +1,184 @@
+"""The rigid motion that all markers of a capture have in common, and the capture without it.
+
+Markers on a hand or a face keep no stable distances, and may still move mostly together. Without
+the motion in common, a marker moves little between two frames, and the motion model knows better
+where.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from asterism.checks import check_kind
+from asterism.model import Detections
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["without_common_motion"]
+
+MIN_FOR_TURN, MIN_PAIRS = 6, 4
+"""Smallest number of pairs of points for a rotation, and for a translation."""
+ROUNDS = 8
+"""Largest number of times that a frame is paired with the points before and fitted to them."""
+OUTLYING = 4.0
+"""Distance of a pair from which it does not count, in the median distance of all pairs, times
+`NORMAL`."""
+NORMAL = 1.4826
+"""Standard deviation of a normal distribution over the median of its absolute values."""
+NEWEST = 1 / 3
+"""Weight of the newest detection in the position of a point."""
+MAX_UNSEEN = 5
+"""Number of frames without a detection after which a point is dropped."""
+MAX_SHIFTED = 60
+"""Largest number of detections of a frame whose pairs are searched for everywhere."""
+LOST = 0.5
+"""Median distance of the pairs, relative to that of a point to the nearest other, from which on
+they are no pairs."""
+
+
+def without_common_motion(detections: Detections) -> Detections:
+    """Remove the rigid motion that most markers have in common from a capture.
+
+    Each frame is fitted to the points of the frames before, by a rotation and a translation: every
+    point is paired with the detection nearest to it, and that with it, and outlying pairs have no
+    weight (Tukey). The fit begins with the velocity of the frame before. If that leads to no pairs,
+    as where the markers are fast in the first frames, it begins with the translation that pairs
+    most. Distances between the detections of a frame stay as they are.
+
+    Parameters
+    ----------
+    detections : Detections
+        Capture of T frames, in 2-D or 3-D.
+
+    Returns
+    -------
+    Detections
+        The same detections in coordinates in which the markers as a whole are at rest. The origin
+        is the median of the first frame that has detections.
+
+    Raises
+    ------
+    ParameterError
+        If it is no capture.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.cube(frames=200, seed=1)
+    >>> d = truth.detections
+    >>> still = am.tracking.without_common_motion(d)
+    >>> paths = [each.points[truth.labels == 0] for each in (d, still)]
+    >>> [f"{float(path.std(axis=0).max()):.4f}" for path in paths]
+    ['0.5488', '0.0000']
+    """
+    check_kind("detections", detections, Detections, "am.Detections.from_frames, or am.read")
+    d, D = detections.measured(), detections.n_axes
+    points = np.empty_like(d.points)
+    known = np.empty((0, D))
+    unseen = np.empty(0, dtype=np.int64)
+    turn, at = np.eye(D), np.zeros(D)
+    last_turn, velocity = np.eye(D), np.zeros(D)
+    is_begun = False
+    for t in range(d.n_frames):
+        own = slice(d.offsets[t], d.offsets[t + 1])
+        y = d.points[own]
+        if not is_begun:
+            if len(y):
+                at, is_begun = np.median(y, axis=0), True
+                known, unseen = y - at, np.zeros(len(y), dtype=np.int64)
+                points[own] = known
+            continue
+        dt = d.times[t] - d.times[t - 1]
+        before = turn, at
+        turn, at = last_turn @ turn, at + dt * velocity
+        turn, at, (ours, theirs) = _fitted(y, known, turn, at)
+        if not len(ours) and min(len(y), len(known)) >= MIN_PAIRS and len(y) <= MAX_SHIFTED:
+            begun = at - turn @ _shift((y - at) @ turn, known)
+            turn, at, (ours, theirs) = _fitted(y, known, turn, begun)
+        last_turn, velocity = _orthogonal(turn @ before[0].T), (at - before[1]) / dt
+        if not len(ours):  # lost: the points of this frame are new
+            last_turn, velocity = np.eye(D), velocity / 2
+            unseen += MAX_UNSEEN
+            if len(y) >= MIN_PAIRS:
+                at = np.median(y, axis=0)
+        z = points[own] = (y - at) @ turn
+        unseen += 1
+        known[theirs] += NEWEST * (z[ours] - known[theirs])
+        unseen[theirs] = 0
+        is_new = np.ones(len(y), dtype=bool)
+        is_new[ours] = False
+        kept = unseen <= MAX_UNSEEN
+        known = np.concatenate([known[kept], z[is_new]])
+        unseen = np.concatenate([unseen[kept], np.zeros(int(is_new.sum()), dtype=np.int64)])
+    return dataclasses.replace(d, points=points)
+
+
+def _fitted(
+    y: NDArray[np.float64],
+    known: NDArray[np.float64],
+    turn: NDArray[np.float64],
+    at: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """Return the rotation and the position of a frame, and its pairs with the known points."""
+    none = np.empty(0, dtype=np.int64)
+    lost = turn, at, (none, none)
+    if min(len(y), len(known)) < MIN_PAIRS:
+        return lost
+    tree, middle, pairs = KDTree(known), 0.0, lost[2]
+    apart = np.median(np.asarray(tree.query(known, k=2)[0])[:, 1])
+    for _ in range(ROUNDS):
+        z = (y - at) @ turn
+        distance, nearest = (np.asarray(each) for each in tree.query(z))
+        back = np.asarray(KDTree(z).query(known)[1])
+        ours = np.flatnonzero(back[nearest] == np.arange(len(z)))
+        theirs, distance = nearest[ours], distance[ours]
+        middle = float(np.median(distance))
+        scale = OUTLYING * NORMAL * middle
+        if not scale > 0:
+            return turn, at, (ours, theirs)
+        weight = np.maximum(1 - (distance / scale) ** 2, 0) ** 2
+        pairs = ours[weight > 0], theirs[weight > 0]
+        if len(pairs[0]) < MIN_PAIRS:
+            return lost
+        has_turn = len(pairs[0]) >= MIN_FOR_TURN
+        R, shift = _rigid(z[ours], known[theirs], weight, has_turn)
+        turn = _orthogonal(turn @ R.T)
+        at = at - turn @ shift
+        if np.abs(shift).max() + np.abs(R - np.eye(len(R))).max() * scale < 1e-3 * scale:
+            break
+    return lost if middle > LOST * apart else (turn, at, pairs)
+
+
+def _shift(z: NDArray[np.float64], known: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the difference of a known point and a detection by which most others are paired."""
+    tree = KDTree(known)
+    reach = LOST * np.median(np.asarray(tree.query(known, k=2)[0])[:, 1])
+    shifts = (known[:, None] - z).reshape(-1, z.shape[1])
+    distance = np.asarray(tree.query(shifts[:, None] + z, distance_upper_bound=reach)[0])
+    near = np.maximum(1 - (distance / max(reach, 1e-12)) ** 2, 0).sum(axis=1)
+    return shifts[near.argmax()]
+
+
+def _rigid(
+    a: NDArray[np.float64], b: NDArray[np.float64], weight: NDArray[np.float64], has_turn: bool
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the rotation R and the translation t of the least squares of R a + t - b."""
+    share = weight / weight.sum()
+    mean_a, mean_b = share @ a, share @ b
+    R = np.eye(a.shape[1])
+    if has_turn:
+        U, _, Vt = np.linalg.svd(((a - mean_a) * share[:, None]).T @ (b - mean_b))
+        R[-1, -1] = np.sign(np.linalg.det(U @ Vt))
+        R = Vt.T @ R @ U.T
+    return R, mean_b - R @ mean_a
+
+
+def _orthogonal(R: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the rotation nearest to a product of rotations, in which rounding accumulates."""
+    U, _, Vt = np.linalg.svd(R)
+    return U @ Vt

@@ -1,0 +1,204 @@
+"""The motion that all markers have in common: what is removed, and tracks without it."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import asterism as am
+from asterism.edit.session import Session
+from asterism.errors import ParameterError
+from asterism.tracking.estimation.common_motion import MIN_PAIRS
+
+
+def moved(shape, n_frames, *, seed=1, step=0.02, turn=0.05):
+    """Positions (T, K, D) of a rigid shape (K, D) that moves and turns smoothly."""
+    rng = np.random.default_rng(seed)
+    D = shape.shape[1]
+    t = np.arange(n_frames)[:, None]
+    at = 10 * step * np.sin(0.1 * t + rng.uniform(0, 6, D))
+    angle = 10 * turn * np.sin(0.1 * t[:, 0])
+    R = np.zeros((n_frames, D, D))
+    R[:] = np.eye(D)
+    R[:, 0, 0] = R[:, 1, 1] = np.cos(angle)
+    R[:, 1, 0], R[:, 0, 1] = np.sin(angle), -np.sin(angle)
+    return np.einsum("tij,kj->tki", R, shape) + at[:, None]
+
+
+def truth_of(positions, **corruption):
+    times = np.arange(len(positions)) / 100
+    return am.simulate.corrupt(am.Tracks.from_dense(times, positions), seed=1, **corruption)
+
+
+def skin(seed=1, n_frames=250, size=0.12):
+    """Markers that move together by more than their distances, and keep none of these."""
+    rng = np.random.default_rng(seed)
+    grid = 0.025 * np.stack(np.meshgrid(range(5), range(4), 0), axis=-1).reshape(-1, 3)
+    rest = grid[:19] + rng.uniform(-0.005, 0.005, (19, 3))
+    t = np.arange(n_frames)[:, None, None] / 100
+    own = 0.006 * np.sin(2 * np.pi * (rng.uniform(1, 2, (19, 3)) * t + rng.uniform(size=(19, 3))))
+    common = size * np.sin(2 * np.pi * (rng.uniform(1, 2, 3) * t + rng.uniform(size=3)))
+    return truth_of(rest + own + common, missing=0.05, clutter=0.05, noise=3e-3)
+
+
+@pytest.mark.parametrize("n_axes", [2, 3])
+def test_a_rigid_cloud_is_at_rest_and_keeps_its_distances(n_axes):
+    rng = np.random.default_rng(n_axes)
+    positions = moved(rng.uniform(-0.2, 0.2, (15, n_axes)), 200)
+    truth = truth_of(positions, missing=0.2, clutter=0.2, noise=1e-3)
+    d, still = truth.detections, am.tracking.without_common_motion(truth.detections)
+    assert np.array_equal(still.offsets, d.offsets)
+    for t in range(0, d.n_frames, 17):
+        own = slice(d.offsets[t], d.offsets[t + 1])
+        before, after = d.points[own], still.points[own]
+        np.testing.assert_allclose(
+            np.linalg.norm(after[:, None] - after, axis=2),
+            np.linalg.norm(before[:, None] - before, axis=2),
+            atol=1e-12,
+        )
+    for k in range(15):
+        own = truth.labels == k
+        assert d.points[own].std(axis=0).max() > 0.05
+        assert still.points[own].std(axis=0).max() < 4e-3
+
+
+def test_turns_do_not_grow_by_rounding_over_thousands_of_frames():
+    rng = np.random.default_rng(3)
+    positions = moved(rng.uniform(-0.2, 0.2, (8, 3)), 4000)
+    still = am.tracking.without_common_motion(truth_of(positions, noise=1e-3).detections)
+    assert np.linalg.norm(still.points, axis=1).max() < 0.5
+
+
+def test_the_largest_group_is_at_rest_where_others_move_otherwise():
+    rng = np.random.default_rng(4)
+    body = moved(rng.uniform(-0.2, 0.2, (14, 3)), 150)
+    other = moved(rng.uniform(-0.2, 0.2, (4, 3)), 150, seed=9, turn=0.1) + 0.8
+    truth = truth_of(np.concatenate([body, other], axis=1), noise=1e-3)
+    still = am.tracking.without_common_motion(truth.detections)
+    paths = [still.points[truth.labels == k] for k in range(18)]
+    steps = [np.median(np.linalg.norm(np.diff(path, axis=0), axis=1)) for path in paths]
+    assert max(steps[:14]) < 0.004 < 0.008 < min(steps[14:])
+
+
+def test_too_few_points_stay_where_they_are_relative_to_the_first_frame():
+    rng = np.random.default_rng(5)
+    positions = moved(rng.uniform(-0.2, 0.2, (MIN_PAIRS - 1, 3)), 20)
+    d = truth_of(positions).detections
+    still = am.tracking.without_common_motion(d)
+    np.testing.assert_allclose(
+        still.points, d.points - np.median(d.points[: MIN_PAIRS - 1], axis=0)
+    )
+
+
+def test_empty_frames_and_a_cloud_that_jumps_are_a_new_beginning():
+    rng = np.random.default_rng(6)
+    positions = moved(rng.uniform(-0.2, 0.2, (10, 3)), 60)
+    positions[:5] = np.nan
+    positions[20:24] = np.nan
+    positions[40:] += 500.0
+    truth = truth_of(positions)
+    still = am.tracking.without_common_motion(truth.detections)
+    assert np.isfinite(still.points).all()
+    for k in range(10):  # also across the jump, which no velocity expects
+        assert np.ptp(still.points[truth.labels == k], axis=0).max() < 0.05
+    nothing = am.Detections.from_frames([0.0, 0.1], [[], []])
+    assert am.tracking.without_common_motion(nothing).n_points == 0
+
+
+def test_markers_that_cannot_be_followed_as_they_are_are_tracked_without_it():
+    truth = skin(size=0.25)
+    with pytest.raises(ParameterError, match="followed"):
+        am.estimate_model(truth.detections)
+    found = am.track(truth.detections)
+    assert found.recipe.common_motion
+    assert am.evaluate(found, truth).idf1 > 0.9
+    with pytest.raises(ParameterError, match="followed"):
+        am.track(truth.detections, "gnn")
+
+
+def test_what_is_no_capture_is_told():
+    with pytest.raises(ParameterError, match="detections"):
+        am.tracking.without_common_motion(3)
+
+
+def test_markers_on_skin_are_tracked_without_the_motion_in_common():
+    truth = skin()
+    d = truth.detections
+    found = am.track(d)
+    assert found.recipe.common_motion
+    assert "more probable" in found.recipe.reason
+    assert found.detections is d
+    model = am.estimate_model(d).model
+    as_it_is = am.track(d, model=model)  # a given model holds for the capture as it is
+    assert not as_it_is.recipe.common_motion
+    assert am.evaluate(found, truth).idf1 > am.evaluate(as_it_is, truth).idf1 + 0.02
+    assert am.evaluate(found, truth).idf1 > 0.97
+    # The confidence is that of the coordinates in which they were tracked.
+    taken = found.labels >= 0
+    assert found.identity_confidence[taken].mean() > 0.95
+
+
+def test_a_recipe_without_the_motion_in_common_repeats_the_result():
+    truth = skin(seed=2)
+    found = am.track(truth.detections, fill=True)
+    recipe = am.model.Recipe.from_dict(found.recipe.to_dict())
+    assert recipe.common_motion
+    assert recipe == found.recipe
+    again = am.track(truth.detections, recipe=recipe)
+    assert np.array_equal(again.labels, found.labels)
+    np.testing.assert_array_equal(again.detections.points, found.detections.points)
+
+
+def test_gaps_are_filled_and_states_are_estimated_where_the_markers_are():
+    truth = skin(seed=3)
+    found = am.track(truth.detections, fill=True)
+    assert found.recipe.common_motion
+    d = found.detections
+    assert d.filled.sum() > 20
+    low, high = truth.detections.points.min(axis=0), truth.detections.points.max(axis=0)
+    filled = d.points[d.filled]
+    assert ((filled > low - 0.02) & (filled < high + 0.02)).all()
+    states = am.tracking.track_states(found.measured())
+    at = states.at(100)
+    own = slice(*found.measured().detections.offsets[100:102])
+    points = found.measured().detections.points[own]
+    nearest = np.linalg.norm(points[:, None] - at.positions, axis=2).min(axis=1)
+    assert np.median(nearest) < 5e-3
+
+
+def test_edits_are_made_in_the_coordinates_of_the_capture(tmp_path):
+    truth = skin(seed=2)
+    d = truth.detections
+    session = Session.open(d, tmp_path / "edits.csv")
+    assert session.begun.recipe.common_motion
+    assert session.tracks.detections is d
+    i = int(np.flatnonzero(session.tracks.labels >= 0)[40])
+    edit = session.edit("clutter", i)
+    session.apply(edit)
+    assert session.tracks.labels[i] == -1
+    result = session.result().tracks
+    assert result.detections is d
+    again = am.track(d, edits=session.edits)
+    assert np.array_equal(again.labels, result.labels)
+
+
+def test_independent_markers_and_people_are_tracked_as_they_are(monkeypatch):
+    monkeypatch.setattr("asterism.tracking.choose.CONFUSED", 0.0)
+    person = am.simulate.person(frames=120, seed=1)
+    for take in (am.simulate.swarm(frames=150, seed=1), am.simulate.smooth(seed=1), person):
+        d = am.simulate.corrupt(take, missing=0.1, clutter=0.1, noise=1e-3, seed=1).detections
+        choice = am.tracking.choose_method(d, am.estimate_model(d).model)
+        assert choice.estimate is None
+
+
+def test_a_choice_without_it_is_not_offered_for_a_given_model():
+    truth = skin()
+    model = am.estimate_model(truth.detections).model
+    found = [
+        am.tracking.choose_method(truth.detections, model, is_estimated=each)
+        for each in (True, False)
+    ]
+    assert found[0].estimate is not None
+    assert found[1] == dataclasses.replace(found[1], estimate=None)
