@@ -1,7 +1,7 @@
 """Markers that move together and keep no distances: tracks with and without the motion in common.
 
 Simulated skin: 19 markers about 20 mm apart, at 120 Hz, with 3 mm of independent noise. They move
-together by 10 or 18 mm in a step (median), and each has a smooth motion of its own besides, of 3 or
+together by 7 or 12 mm in a step (median), and each has a smooth motion of its own besides, of 3 or
 6 mm (standard deviation of each of four oscillations, over two). Clean, and with 10 % missing and
 10 % clutter. Compared are `am.track`, the same with the estimated model given, so that the motion
 in common stays, and MCMCDA with 200 moves. Means of seeds.

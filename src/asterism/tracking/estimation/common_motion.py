@@ -8,7 +8,7 @@ where.
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -36,9 +36,20 @@ MAX_UNSEEN = 5
 """Number of frames without a detection after which a point is dropped."""
 MAX_SHIFTED = 60
 """Largest number of detections of a frame whose pairs are searched for everywhere."""
-LOST = 0.5
-"""Median distance of the pairs, relative to that of a point to the nearest other, from which on
-they are no pairs."""
+DOUBTFUL, LOST = 0.5, 0.2
+"""Agreement of a fit, 0 to 1, below which another one is searched for, and below which there is no
+fit: the share of the detections that are paired, less for each the squared distance of the pair
+relative to that of a point to the nearest other."""
+
+
+class _Fit(NamedTuple):
+    """Rotation and position of a frame, its pairs with the known points, and their agreement."""
+
+    turn: NDArray[np.float64]
+    at: NDArray[np.float64]
+    ours: NDArray[np.int64]
+    theirs: NDArray[np.int64]
+    agreement: float
 
 
 def without_common_motion(detections: Detections) -> Detections:
@@ -46,9 +57,9 @@ def without_common_motion(detections: Detections) -> Detections:
 
     Each frame is fitted to the points of the frames before, by a rotation and a translation: every
     point is paired with the detection nearest to it, and that with it, and outlying pairs have no
-    weight (Tukey). The fit begins with the velocity of the frame before. If that leads to no pairs,
-    as where the markers are fast in the first frames, it begins with the translation that pairs
-    most. Distances between the detections of a frame stay as they are.
+    weight (Tukey). The fit begins with the velocity of the frame before. If few pairs agree then,
+    as where the markers are fast in the first frames, it also begins with the translation that
+    pairs most. Distances between the detections of a frame stay as they are.
 
     Parameters
     ----------
@@ -96,12 +107,9 @@ def without_common_motion(detections: Detections) -> Detections:
         dt = d.times[t] - d.times[t - 1]
         before = turn, at
         turn, at = last_turn @ turn, at + dt * velocity
-        turn, at, (ours, theirs) = _fitted(y, known, turn, at)
-        if not len(ours) and min(len(y), len(known)) >= MIN_PAIRS and len(y) <= MAX_SHIFTED:
-            begun = at - turn @ _shift((y - at) @ turn, known)
-            turn, at, (ours, theirs) = _fitted(y, known, turn, begun)
+        turn, at, ours, theirs, agreement = _fitted(y, known, turn, at)
         last_turn, velocity = _orthogonal(turn @ before[0].T), (at - before[1]) / dt
-        if not len(ours):  # lost: the points of this frame are new
+        if agreement < LOST:  # the points of this frame are new
             last_turn, velocity = np.eye(D), velocity / 2
             unseen += MAX_UNSEEN
             if len(y) >= MIN_PAIRS:
@@ -123,55 +131,72 @@ def _fitted(
     known: NDArray[np.float64],
     turn: NDArray[np.float64],
     at: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], tuple[NDArray[np.int64], NDArray[np.int64]]]:
-    """Return the rotation and the position of a frame, and its pairs with the known points."""
+) -> _Fit:
+    """Fit a frame to the known points, from here, or from the translation that pairs most."""
     none = np.empty(0, dtype=np.int64)
-    lost = turn, at, (none, none)
     if min(len(y), len(known)) < MIN_PAIRS:
-        return lost
-    tree, middle, pairs = KDTree(known), 0.0, lost[2]
-    apart = np.median(np.asarray(tree.query(known, k=2)[0])[:, 1])
+        return _Fit(turn, at, none, none, 0.0)
+    tree = KDTree(known)
+    apart = max(float(np.median(np.asarray(tree.query(known, k=2)[0])[:, 1])), 1e-9)
+    fit = _paired(y, known, tree, apart, turn, at)
+    if fit.agreement < DOUBTFUL and len(y) <= MAX_SHIFTED:
+        begun = at - turn @ _shift((y - at) @ turn, known, tree, apart)
+        other = _paired(y, known, tree, apart, turn, begun)
+        fit = max(fit, other, key=lambda each: each.agreement)
+    return fit if fit.agreement >= LOST else _Fit(turn, at, none, none, fit.agreement)
+
+
+def _paired(
+    y: NDArray[np.float64],
+    known: NDArray[np.float64],
+    tree: KDTree,
+    apart: float,
+    turn: NDArray[np.float64],
+    at: NDArray[np.float64],
+) -> _Fit:
+    """Pair a frame with the known points, and fit it to them, until both agree."""
+    ours = theirs = np.empty(0, dtype=np.int64)
+    agreement = 0.0
     for _ in range(ROUNDS):
         z = (y - at) @ turn
         distance, nearest = (np.asarray(each) for each in tree.query(z))
         back = np.asarray(KDTree(z).query(known)[1])
         ours = np.flatnonzero(back[nearest] == np.arange(len(z)))
         theirs, distance = nearest[ours], distance[ours]
-        middle = float(np.median(distance))
-        scale = OUTLYING * NORMAL * middle
+        agreement = float(np.maximum(1 - (distance / apart) ** 2, 0).sum()) / len(y)
+        scale = OUTLYING * NORMAL * float(np.median(distance))
         if not scale > 0:
-            return turn, at, (ours, theirs)
+            break
         weight = np.maximum(1 - (distance / scale) ** 2, 0) ** 2
-        pairs = ours[weight > 0], theirs[weight > 0]
-        if len(pairs[0]) < MIN_PAIRS:
-            return lost
-        has_turn = len(pairs[0]) >= MIN_FOR_TURN
-        R, shift = _rigid(z[ours], known[theirs], weight, has_turn)
+        ours, theirs, weight = ours[weight > 0], theirs[weight > 0], weight[weight > 0]
+        if len(ours) < MIN_PAIRS:
+            return _Fit(turn, at, ours, theirs, 0.0)
+        R, shift = _rigid(z[ours], known[theirs], weight)
         turn = _orthogonal(turn @ R.T)
         at = at - turn @ shift
         if np.abs(shift).max() + np.abs(R - np.eye(len(R))).max() * scale < 1e-3 * scale:
             break
-    return lost if middle > LOST * apart else (turn, at, pairs)
+    return _Fit(turn, at, ours, theirs, agreement)
 
 
-def _shift(z: NDArray[np.float64], known: NDArray[np.float64]) -> NDArray[np.float64]:
+def _shift(
+    z: NDArray[np.float64], known: NDArray[np.float64], tree: KDTree, apart: float
+) -> NDArray[np.float64]:
     """Return the difference of a known point and a detection by which most others are paired."""
-    tree = KDTree(known)
-    reach = LOST * np.median(np.asarray(tree.query(known, k=2)[0])[:, 1])
     shifts = (known[:, None] - z).reshape(-1, z.shape[1])
-    distance = np.asarray(tree.query(shifts[:, None] + z, distance_upper_bound=reach)[0])
-    near = np.maximum(1 - (distance / max(reach, 1e-12)) ** 2, 0).sum(axis=1)
+    distance = np.asarray(tree.query(shifts[:, None] + z, distance_upper_bound=apart)[0])
+    near = np.maximum(1 - (distance / apart) ** 2, 0).sum(axis=1)
     return shifts[near.argmax()]
 
 
 def _rigid(
-    a: NDArray[np.float64], b: NDArray[np.float64], weight: NDArray[np.float64], has_turn: bool
+    a: NDArray[np.float64], b: NDArray[np.float64], weight: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the rotation R and the translation t of the least squares of R a + t - b."""
     share = weight / weight.sum()
     mean_a, mean_b = share @ a, share @ b
     R = np.eye(a.shape[1])
-    if has_turn:
+    if len(a) >= MIN_FOR_TURN:
         U, _, Vt = np.linalg.svd(((a - mean_a) * share[:, None]).T @ (b - mean_b))
         R[-1, -1] = np.sign(np.linalg.det(U @ Vt))
         R = Vt.T @ R @ U.T
