@@ -52,5 +52,6 @@ def test_the_longest_gaps_have_names_and_agreeing_lengths(tmp_path, capsys):
         figures = f"frames {gap['first']} to {gap['last']} (3 frames, {4 * period:.3g} s between"
         assert gap["last"] - gap["first"] == 2
         assert (gap["name"] is None) is not bool(sets)
-        assert rows[bool(sets)] == f"{gap['name'] or 'track 3'}, {figures} detections)"
+        number = f"track {gap['track']}"
+        assert rows[bool(sets)] == f"{gap['name'] or number}, {figures} detections)"
     assert gap["name"] in am.io.read_tracks(tmp_path / "out.csv").names
