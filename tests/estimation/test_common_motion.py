@@ -92,6 +92,17 @@ def test_too_few_points_stay_where_they_are_relative_to_the_first_frame():
     )
 
 
+def test_frames_with_few_points_change_nothing():
+    rng = np.random.default_rng(8)
+    positions = moved(rng.uniform(-0.2, 0.2, (5, 3)), 200, step=0.05, turn=0.0)
+    for t, n in ((50, 3), (90, 0), (130, 1), (170, 2)):
+        positions[t, n:] = np.nan
+    truth = truth_of(positions)
+    still = am.tracking.without_common_motion(truth.detections)
+    for k in range(5):
+        assert np.ptp(still.points[truth.labels == k], axis=0).max() < 0.02
+
+
 def test_empty_frames_and_a_cloud_that_jumps_are_a_new_beginning():
     rng = np.random.default_rng(6)
     positions = moved(rng.uniform(-0.2, 0.2, (10, 3)), 60)
@@ -114,8 +125,25 @@ def test_markers_that_cannot_be_followed_as_they_are_are_tracked_without_it():
     found = am.track(truth.detections)
     assert found.recipe.common_motion
     assert am.evaluate(found, truth).idf1 > 0.9
+    assert found.recipe.reason.startswith("without the motion that all markers have in common")
     with pytest.raises(ParameterError, match="followed"):
         am.track(truth.detections, "gnn")
+
+
+def test_gaps_and_states_need_no_model_that_cannot_be_estimated(tmp_path):
+    truth = skin(size=0.25)
+    found = am.track(truth.detections, fill=True)
+    filled = found.detections.filled
+    assert filled.sum() > 20
+    assert np.linalg.norm(found.detections.stds[filled], axis=-1).max() < 0.1
+    low, high = truth.detections.points.min(axis=0), truth.detections.points.max(axis=0)
+    points = found.detections.points[filled]
+    assert ((points > low - 0.02) & (points < high + 0.02)).all()
+    assert am.tracking.track_states(found.measured()).at(100).positions.shape == (19, 3)
+    session = Session.open(truth.detections, tmp_path / "edits.csv")
+    gap = session.tracks.gaps()[0]
+    positions, _ = session.fill_preview(gap.track, gap.first, gap.last)
+    assert np.isfinite(positions).all()
 
 
 def test_what_is_no_capture_is_told():
@@ -174,6 +202,10 @@ def test_edits_are_made_in_the_coordinates_of_the_capture(tmp_path):
     session = Session.open(d, tmp_path / "edits.csv")
     assert session.begun.recipe.common_motion
     assert session.tracks.detections is d
+    # The page shows the confidence of the coordinates in which they were tracked.
+    shown, whole = session.assessed(session.tracks, ()), session.result().tracks
+    assert np.array_equal(shown.identity_confidence, whole.identity_confidence)
+    assert shown.detections is d
     i = int(np.flatnonzero(session.tracks.labels >= 0)[40])
     edit = session.edit("clutter", i)
     session.apply(edit)

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 __all__ = ["Summary", "stitching_rows", "summarize"]
 
 
+REMOVED = "removed before the tracking: model and log posterior are those of the rest"
+
+
 @dataclass(frozen=True, kw_only=True)
 class Summary:
     """Figures of a finished tracking.
@@ -37,6 +40,9 @@ class Summary:
         Number of gaps in tracks.
     n_edits : int
         Number of edits that the tracks respect.
+    common_motion : bool
+        Whether the motion that all markers have in common was removed before the tracking. The
+        model and the log posterior are those of the rest.
     longest_gaps : tuple of am.model.Gap
         Longest gaps, at most three.
     gap_names : tuple of str or None
@@ -75,6 +81,7 @@ class Summary:
     n_clutter: int
     n_gaps: int
     n_edits: int
+    common_motion: bool
     longest_gaps: tuple[am.model.Gap, ...]
     gap_names: tuple[str | None, ...]
     seconds: float
@@ -99,6 +106,7 @@ class Summary:
         share = 100 * self.n_labelled / max(self.n_detections, 1)
         return [
             *([("edits", f"{self.n_edits} respected")] if self.n_edits else []),
+            *([("motion in common", REMOVED)] if self.common_motion else []),
             ("tracks", str(self.n_tracks)),
             ("detections labelled", f"{self.n_labelled} of {self.n_detections} ({share:.1f} %)"),
             ("clutter", str(self.n_clutter)),
@@ -202,6 +210,7 @@ def summarize(
         n_clutter=d.n_points - n_labelled,
         n_gaps=len(gaps),
         n_edits=n_edits,
+        common_motion=recipe.common_motion,
         longest_gaps=tuple(
             dataclasses.replace(gap, first=d.first_frame + gap.first, last=d.first_frame + gap.last)
             for gap in longest

@@ -12,8 +12,6 @@ import numpy as np
 from asterism.edit.view import View
 from asterism.errors import AsterismError, ParameterError
 from asterism.reporting.page import Editing
-from asterism.tracking import assess
-from asterism.tracking.correction import settled
 
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, Sequence
@@ -61,7 +59,7 @@ class Hub:
         self._readers: set[asyncio.Queue[_Event | None]] = set()
         self._n_undone = 0
         self._names: Sequence[str] = session.tracks.display_names
-        self._assessed = self._assess(session.tracks, session.edits)
+        self._assessed = session.assessed(session.tracks, session.edits)
         self._decisions: list[tuple[Decision, ...]] = [_uncertain(self._assessed)]
         self._assessment_of = 0
         self._task: asyncio.Task[None] | None = None
@@ -243,7 +241,7 @@ class Hub:
                 version = len(self._log)
                 tracks, edits = self.session.tracks, self.session.edits
             try:
-                found = await asyncio.to_thread(self._assess, tracks, edits)
+                found = await asyncio.to_thread(self.session.assessed, tracks, edits)
             except AsterismError as error:
                 log.warning("%s", error)
                 return
@@ -253,10 +251,6 @@ class Hub:
             self._decisions = [*self._decisions, *older, _uncertain(found)][-_ASSESSMENTS:]
             self._assessment_of = version
             self._send("assessment", self._assessment(changed, values))
-
-    def _assess(self, tracks: Tracks, edits: Sequence[Edit]) -> Tracks:
-        begun = self.session.begun
-        return settled(assess(tracks, begun.model, begun.stitching), edits)
 
     def _changed_confidences(self, found: Tracks) -> tuple[list[int], list[int]]:
         before, now = self._assessed.identity_confidence, found.identity_confidence

@@ -15,6 +15,7 @@ from asterism.model import Decision, Detections, Edit, Recipe
 from asterism.model.recipe import sha256_of
 from asterism.tracking import Correction, Tracked, assess, fill_gaps, plan_tracking
 from asterism.tracking.correction import settled
+from asterism.tracking.history import model_of
 from asterism.tracking.pipeline import conclude, without_edits
 
 if TYPE_CHECKING:
@@ -290,10 +291,22 @@ class Session:
 
     def decisions(self) -> tuple[Decision, ...]:
         """Return the uncertain identities and names, by falling expected wrong detections."""
-        found = settled(
-            assess(self._correction.tracks, self.begun.model, self.begun.stitching), self.edits
-        ).decisions
+        found = self.assessed(self.tracks, self.edits).decisions
         return tuple(sorted(found, key=lambda each: -each.expected_wrong))
+
+    def assessed(self, tracks: Tracks, edits: Sequence[Edit]) -> Tracks:
+        """Return tracks of the session with the confidence of their identities.
+
+        Parameters
+        ----------
+        tracks : Tracks
+            Tracks at some time.
+        edits : sequence of Edit
+            Edits that held then.
+        """
+        begun = self.begun
+        found = assess(begun.as_modelled(tracks), begun.model, begun.stitching)
+        return settled(begun.as_captured(found), edits)
 
     def fill_preview(
         self, track: int, first: int, last: int
@@ -315,9 +328,8 @@ class Session:
             Standard deviation of a coordinate, metres.
         """
         edit = self.fill(track, first, last)
-        tracks = fill_gaps(
-            self.tracks, model=self.begun.capture_model, longest=0.0, edits=(edit,)
-        ).tracks
+        model = model_of(self.tracks, self.begun.recipe)
+        tracks = fill_gaps(self.tracks, model=model, longest=0.0, edits=(edit,)).tracks
         d = tracks.detections
         if d.filled is None or d.stds is None:
             raise ParameterError("track", "a gap of these frames", f"track {track}")

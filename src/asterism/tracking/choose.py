@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asterism.checks import check_kind
+from asterism.errors import ParameterError
 from asterism.model import Detections, RandomWalk, TrackingModel, Tracks
 from asterism.model.posterior import track_scores
 from asterism.records import record
@@ -108,10 +109,10 @@ def choose_method(
     - Markers that move by a random walk, or that enter each other's gates: `MCMCDA`.
     - Any other capture is unambiguous: `GNN`.
 
-    Where every link has a rival, the same is measured without the motion that all markers have in
-    common. The capture is tracked so if no bodies are lost and the detections are more probable by
-    more than this motion costs: half the logarithm of the number of detections of a frame for each
-    of its coordinates and angles (BIC).
+    Where there are no bodies and every link has a rival, the same is measured without the motion
+    that all markers have in common. The capture is tracked so if the detections are more probable
+    by more than this motion costs: half the logarithm of the number of detections of a frame for
+    each of its coordinates and angles (BIC).
 
     Parameters
     ----------
@@ -150,11 +151,9 @@ def choose_method(
     detections = detections.measured()
     tracks, rivals = _quick_tracks(detections, model)
     choice = _as_it_is(tracks, model, rivals)
-    if is_estimated and rivals > CONFUSED:
-        together = _without_common(detections, model)
-        # Bodies that move apart are lost without the motion of the largest.
-        if together is not None and together.stitch >= choice.stitch:
-            return together
+    # Bodies that move apart would be lost in the coordinates of one of them.
+    if is_estimated and rivals > CONFUSED and not choice.stitch:
+        return _without_common(detections, model) or choice
     return choice
 
 
@@ -196,8 +195,12 @@ def _without_common(detections: Detections, model: TrackingModel) -> Choice | No
     n_frames = detections.n_frames * MAX_COMPARED // max(detections.n_points, 1)
     part = detections.part(0, max(min(n_frames, detections.n_frames), MIN_TOGETHER))
     still = without_common_motion(part)
-    found = _quick_tracks(still, of_still := estimate_model(still).model)[0]
-    gain = _log_density(found, of_still) - _log_density(_quick_tracks(part, model)[0], model)
+    try:
+        model_of_rest = estimate_model(still).model
+    except ParameterError:
+        return None
+    found = _quick_tracks(still, model_of_rest)[0]
+    gain = _log_density(found, model_of_rest) - _log_density(_quick_tracks(part, model)[0], model)
     D, T = part.n_axes, part.n_frames
     cost = T * D * (D + 1) / 2 * 0.5 * math.log(max(part.n_points / T, 1))
     if gain <= cost:

@@ -9,9 +9,9 @@ import numpy as np
 from asterism.checks import check_kind
 from asterism.errors import ParameterError
 from asterism.filter import States, smooth_states
-from asterism.model import TrackingModel, Tracks
+from asterism.model import Recipe, TrackingModel, Tracks
 from asterism.records import record
-from asterism.tracking.estimation import estimate_model
+from asterism.tracking.estimation import fit_to_capture
 from asterism.tracking.methods import TrackStates
 
 if TYPE_CHECKING:
@@ -127,6 +127,19 @@ class TrackHistory:
         return dense
 
 
+def model_of(tracks: Tracks, recipe: Recipe) -> TrackingModel:
+    """Return the model that holds for tracks in the coordinates of their capture.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks of a recipe.
+    recipe : Recipe
+        Recipe, whose model may be that of the capture without its common motion.
+    """
+    return fit_to_capture(tracks, recipe.model) if recipe.common_motion else recipe.model
+
+
 def track_states(tracks: Tracks, *, model: TrackingModel | None = None) -> TrackHistory:
     """Estimate position, velocity and covariance of every track in every frame of a capture.
 
@@ -159,7 +172,5 @@ def track_states(tracks: Tracks, *, model: TrackingModel | None = None) -> Track
         if tracks.recipe is None:
             hint = "pass am.estimate_model(tracks.detections).model"
             raise ParameterError("model", "a model, as the tracks have no recipe", "none", hint)
-        recipe = tracks.recipe
-        is_still = recipe.common_motion  # its model is that of the rest of the motion
-        model = estimate_model(tracks.detections).model if is_still else recipe.model
+        model = model_of(tracks, tracks.recipe)
     return TrackHistory(tracks=tracks, states=smooth_states(tracks, model))

@@ -16,6 +16,7 @@ from asterism.tracking.correction import correct, settled
 from asterism.tracking.decisions import of_filling, of_naming, of_stitching
 from asterism.tracking.estimation import without_common_motion
 from asterism.tracking.filling import LONGEST, fill_gaps
+from asterism.tracking.history import model_of
 from asterism.tracking.naming import name_tracks
 from asterism.tracking.plan import hash_of_names, plan_tracking
 
@@ -260,7 +261,7 @@ def conclude(begun: Uncorrected, edits: Sequence[Edit] = ()) -> Tracked:
     filling = None
     if is_filled:
         longest = LONGEST if recipe.fill else 0.0  # only the gaps that edits state
-        filling = fill_gaps(tracks, model=begun.capture_model, edits=edits, longest=longest)
+        filling = fill_gaps(tracks, model=model_of(tracks, recipe), edits=edits, longest=longest)
         tracks = filling.tracks
         decisions += of_filling(filling)
     carried = None if tracks.recipe is None else recipe

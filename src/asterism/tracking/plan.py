@@ -25,6 +25,13 @@ if TYPE_CHECKING:
 __all__ = ["Plan", "hash_of_names", "plan_tracking"]
 
 
+UNFOLLOWED = (
+    "without the motion that all markers have in common, as none is nearer to its next position "
+    "than to others"
+)
+"""Reason for it where no model can be estimated with this motion."""
+
+
 @record
 class Plan:
     """Settings of a tracking before it is run.
@@ -132,9 +139,11 @@ def plan_tracking(
         is_estimated = estimate is not None and not common_motion
         choice = choose_method(seen, model, has_start=start is not None, is_estimated=is_estimated)
         method, reason = choice.method, choice.reason
+        stitch = choice.stitch if stitch == "auto" else stitch
         if choice.estimate is not None:
             common_motion, estimate, model = True, choice.estimate, choice.estimate.model
-        stitch = choice.stitch if stitch == "auto" else stitch
+    if seen is not detections:
+        reason = f"{UNFOLLOWED}, {reason}"
     recipe = Recipe(
         method=method.name,
         options=options_of(method),

@@ -201,7 +201,8 @@ def track(
     if prints:
         _print_capture(capture)
         if estimate is not None:
-            print_table(estimate.reasons, ("parameter", "value", "why"), title="Model")
+            rest = ", without the motion in common" if recipe.common_motion else ""
+            print_table(estimate.reasons, ("parameter", "value", "why"), title=f"Model{rest}")
         if recipe.chosen:
             print_table([("method", recipe.chosen)])
     job = Run(

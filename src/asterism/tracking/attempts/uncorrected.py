@@ -13,7 +13,6 @@ from asterism.tracking.confidence.identity import (
     expected_right,
     with_confidence,
 )
-from asterism.tracking.estimation import estimate_model
 
 if TYPE_CHECKING:
     from asterism.model import Detections, Recipe, TrackingModel, Tracks
@@ -76,13 +75,6 @@ class Uncorrected:
         if self.still is None:
             return tracks
         return replace(tracks, detections=self.tracks.detections)
-
-    @cached_property
-    def capture_model(self) -> TrackingModel:
-        """Model of the capture as it is."""
-        if self.still is None:
-            return self.recipe.model
-        return estimate_model(self.tracks.detections).model
 
     @cached_property
     def examined(self) -> Examined:

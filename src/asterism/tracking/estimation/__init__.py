@@ -3,6 +3,7 @@
 from asterism.tracking.estimation.body_motion import (
     OVER_THREE_FRAMES,
     fit_body_motion,
+    fit_to_capture,
     fit_to_tracks,
 )
 from asterism.tracking.estimation.common_motion import without_common_motion
@@ -14,6 +15,7 @@ __all__ = [
     "ModelEstimate",
     "estimate_model",
     "fit_body_motion",
+    "fit_to_capture",
     "fit_to_tracks",
     "without_common_motion",
 ]

@@ -109,11 +109,10 @@ def without_common_motion(detections: Detections) -> Detections:
         turn, at = last_turn @ turn, at + dt * velocity
         turn, at, ours, theirs, agreement = _fitted(y, known, turn, at)
         last_turn, velocity = _orthogonal(turn @ before[0].T), (at - before[1]) / dt
-        if agreement < LOST:  # the points of this frame are new
+        if agreement < LOST and len(y) >= MIN_PAIRS:  # lost: the points of this frame are new
             last_turn, velocity = np.eye(D), velocity / 2
             unseen += MAX_UNSEEN
-            if len(y) >= MIN_PAIRS:
-                at = np.median(y, axis=0)
+            at = np.median(y, axis=0)
         z = points[own] = (y - at) @ turn
         unseen += 1
         known[theirs] += NEWEST * (z[ours] - known[theirs])
