@@ -64,6 +64,21 @@ def test_a_rigid_cloud_is_at_rest_and_keeps_its_distances(n_axes):
         assert still.points[own].std(axis=0).max() < 4e-3
 
 
+def test_a_flat_cloud_is_never_mirrored():
+    rng = np.random.default_rng(7)
+    shape = rng.uniform(-0.2, 0.2, (8, 3)) * [1, 1, 0]
+    truth = truth_of(moved(shape, 100), noise=1e-3)
+    d, still = truth.detections, am.tracking.without_common_motion(truth.detections)
+    for t in range(d.n_frames):
+        before, after = (
+            np.linalg.det(
+                each.points[d.offsets[t] + 1 : d.offsets[t] + 4] - each.points[d.offsets[t]]
+            )
+            for each in (d, still)
+        )
+        assert after == pytest.approx(before, abs=1e-12)
+
+
 def test_turns_do_not_grow_by_rounding_over_thousands_of_frames():
     rng = np.random.default_rng(3)
     positions = moved(rng.uniform(-0.2, 0.2, (8, 3)), 4000)

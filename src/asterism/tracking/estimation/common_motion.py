@@ -108,7 +108,7 @@ def without_common_motion(detections: Detections) -> Detections:
         before = turn, at
         turn, at = last_turn @ turn, at + dt * velocity
         turn, at, ours, theirs, agreement = _fitted(y, known, turn, at)
-        last_turn, velocity = _orthogonal(turn @ before[0].T), (at - before[1]) / dt
+        last_turn, velocity = turn @ before[0].T, (at - before[1]) / dt
         if agreement < LOST and len(y) >= MIN_PAIRS:  # lost: the points of this frame are new
             last_turn, velocity = np.eye(D), velocity / 2
             unseen += MAX_UNSEEN
