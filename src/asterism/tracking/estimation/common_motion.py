@@ -11,13 +11,13 @@ import dataclasses
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from asterism.checks import check_kind
 from asterism.model import Detections
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+    from scipy.spatial import KDTree
 
 __all__ = ["without_common_motion"]
 
@@ -132,6 +132,8 @@ def _fitted(
     at: NDArray[np.float64],
 ) -> _Fit:
     """Fit a frame to the known points, from here, or from the translation that pairs most."""
+    from scipy.spatial import KDTree
+
     none = np.empty(0, dtype=np.int64)
     if min(len(y), len(known)) < MIN_PAIRS:
         return _Fit(turn, at, none, none, 0.0)
@@ -154,6 +156,8 @@ def _paired(
     at: NDArray[np.float64],
 ) -> _Fit:
     """Pair a frame with the known points, and fit it to them, until both agree."""
+    from scipy.spatial import KDTree
+
     ours = theirs = np.empty(0, dtype=np.int64)
     agreement = 0.0
     for _ in range(ROUNDS):
