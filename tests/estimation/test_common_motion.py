@@ -118,6 +118,20 @@ def test_frames_with_few_points_change_nothing():
         assert np.ptp(still.points[truth.labels == k], axis=0).max() < 0.02
 
 
+def test_a_motion_ends_where_it_cannot_be_fitted_for_long():
+    rng = np.random.default_rng(9)
+    positions = moved(rng.uniform(-0.2, 0.2, (10, 3)), 600, turn=0.3)
+    positions[20:500, 3:] = np.nan  # three markers are too few
+    positions[100:300] = np.nan
+    truth = truth_of(positions, noise=1e-3)
+    still = am.tracking.without_common_motion(truth.detections)
+    assert np.abs(still.points).max() < 2.0
+    for k in range(10):
+        for some in ((truth.detections.frame_of < 20), (truth.detections.frame_of >= 500)):
+            own = (truth.labels == k) & some
+            assert np.ptp(still.points[own], axis=0).max() < 0.02
+
+
 def test_empty_frames_and_a_cloud_that_jumps_are_a_new_beginning():
     rng = np.random.default_rng(6)
     positions = moved(rng.uniform(-0.2, 0.2, (10, 3)), 60)

@@ -90,35 +90,33 @@ def without_common_motion(detections: Detections) -> Detections:
     check_kind("detections", detections, Detections, "am.Detections.from_frames, or am.read")
     d, D = detections.measured(), detections.n_axes
     points = np.empty_like(d.points)
+    if not len(points):
+        return d
+    turn, at = np.eye(D), np.median(d.points[: d.counts[d.counts > 0][0]], axis=0)
+    last_turn, velocity = np.eye(D), np.zeros(D)
     known = np.empty((0, D))
     unseen = np.empty(0, dtype=np.int64)
-    turn, at = np.eye(D), np.zeros(D)
-    last_turn, velocity = np.eye(D), np.zeros(D)
-    is_begun = False
     for t in range(d.n_frames):
         own = slice(d.offsets[t], d.offsets[t + 1])
-        y = d.points[own]
-        if not is_begun:
-            if len(y):
-                at, is_begun = np.median(y, axis=0), True
-                known, unseen = y - at, np.zeros(len(y), dtype=np.int64)
-                points[own] = known
-            continue
+        y, before = d.points[own], (turn, at)
         dt = d.times[t] - d.times[t - 1]
-        before = turn, at
-        turn, at = last_turn @ turn, at + dt * velocity
+        if len(known):
+            turn, at = last_turn @ turn, at + dt * velocity
         turn, at, ours, theirs, agreement = _fitted(y, known, turn, at)
-        last_turn, velocity = turn @ before[0].T, (at - before[1]) / dt
-        if agreement < LOST and len(y) >= MIN_PAIRS:  # lost: the points of this frame are new
-            last_turn, velocity = np.eye(D), velocity / 2
-            unseen += MAX_UNSEEN
-            at = np.median(y, axis=0)
-        z = points[own] = (y - at) @ turn
-        unseen += 1
-        known[theirs] += NEWEST * (z[ours] - known[theirs])
-        unseen[theirs] = 0
         is_new = np.ones(len(y), dtype=bool)
         is_new[ours] = False
+        if agreement >= LOST:
+            last_turn, velocity = turn @ before[0].T, (at - before[1]) / dt
+        elif len(y) < MIN_PAIRS:  # too few for a fit: the motion goes on while points are known
+            is_new[:] = False
+        else:  # lost: the points of this frame are the known ones
+            turn, at = before[0], np.median(y, axis=0)
+            last_turn, velocity = np.eye(D), velocity / 2
+            known, unseen = known[:0], unseen[:0]
+        z = points[own] = (y - at) @ turn
+        unseen = unseen + 1
+        known[theirs] += NEWEST * (z[ours] - known[theirs])
+        unseen[theirs] = 0
         kept = unseen <= MAX_UNSEEN
         known = np.concatenate([known[kept], z[is_new]])
         unseen = np.concatenate([unseen[kept], np.zeros(int(is_new.sum()), dtype=np.int64)])
