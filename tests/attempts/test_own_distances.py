@@ -71,3 +71,16 @@ def test_rounds_after_the_first_begin_with_tracks_that_were_stitched_again(monke
     assert begun == [0, 1, 2]  # the last round made no more identities certain
     first.has_bonds = False
     assert own_distances.assigned_again(first) is first
+
+
+def test_tracks_that_lose_all_names_are_not_named_again(monkeypatch):
+    tracks = followed_through_a_gap()[1].tracks
+    unnamed = dataclasses.replace(tracks, names=(None,) * tracks.n_tracks)
+    monkeypatch.setattr(own_distances, "name_tracks", lambda *_: SimpleNamespace(tracks=unnamed))
+    monkeypatch.setattr(
+        own_distances,
+        "_with_labels",
+        lambda *_: SimpleNamespace(tracks=unnamed, expected_right=1, is_doubtful=True),
+    )
+    first = SimpleNamespace(tracks=tracks, expected_right=0, is_doubtful=True)
+    assert own_distances.refined_by_own_distances(first).expected_right == 1

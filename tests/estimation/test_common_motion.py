@@ -1,4 +1,4 @@
-"""The motion that all markers have in common: what is removed, and tracks without it."""
+"""The motion that most markers have in common: what is removed, and tracks without it."""
 
 from __future__ import annotations
 
@@ -154,7 +154,7 @@ def test_markers_that_cannot_be_followed_as_they_are_are_tracked_without_it():
     found = am.track(truth.detections)
     assert found.recipe.common_motion
     assert am.evaluate(found, truth).idf1 > 0.9
-    assert found.recipe.reason.startswith("without the motion that all markers have in common")
+    assert found.recipe.reason.startswith("without the motion that most markers have in common")
     with pytest.raises(ParameterError, match="followed"):
         am.track(truth.detections, "gnn")
 

@@ -54,7 +54,7 @@ def write_page(
     else:
         rows += [(f"model: {name}", f"{value}: {why}") for name, value, why in estimate.reasons]
         name, value, _ = estimate.reasons[0]
-        rest = " without the motion that all markers have in common" * recipe.common_motion
+        rest = " without the motion that most markers have in common" * recipe.common_motion
         made += f"The model was estimated from the capture{rest} ({name} {value}; "
         made += "the others are below)."
     report(result.tracks, page, naming=result.naming, made=made, summary=rows)

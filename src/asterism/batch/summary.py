@@ -41,7 +41,7 @@ class Summary:
     n_edits : int
         Number of edits that the tracks respect.
     common_motion : bool
-        Whether the motion that all markers have in common was removed before the tracking. The
+        Whether the motion that most markers have in common was removed before the tracking. The
         model and the log posterior are those of the rest.
     longest_gaps : tuple of am.model.Gap
         Longest gaps, at most three.

@@ -108,7 +108,7 @@ class Recipe:
         Number of passes of the method over the capture. Before each further pass it learns bonds
         from the tracks of the pass before.
     common_motion : bool
-        Whether the motion that all markers have in common is removed before (
+        Whether the motion that most markers have in common is removed before (
         `asterism.tracking.without_common_motion`). The model is then that of the rest.
 
     Examples

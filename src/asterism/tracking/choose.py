@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from asterism.tracking.estimation import ModelEstimate
     from asterism.tracking.methods.base import Method
 
-__all__ = ["AUTO", "Choice", "choose_method"]
+__all__ = ["AUTO", "Choice", "choose_method", "without_motion_in_common"]
 
 AUTO = "auto"
 """Name on the command line for the automatic selection of a method."""
@@ -110,7 +110,7 @@ def choose_method(
     - Any other capture is unambiguous: `GNN`.
 
     Where there are no bodies and every link has a rival, the same is measured without the motion
-    that all markers have in common. The capture is tracked so if the detections are more probable
+    that most markers have in common. The capture is tracked so if the detections are more probable
     by more than this motion costs: half the logarithm of the number of detections of a frame for
     each of its coordinates and angles (BIC).
 
@@ -151,9 +151,9 @@ def choose_method(
     detections = detections.measured()
     tracks, rivals = _quick_tracks(detections, model)
     choice = _as_it_is(tracks, model, rivals)
-    # Bodies that move apart would be lost in the coordinates of one of them.
+    # Bodies that move apart would be lost in the coordinates of one of them: see `most_certain`.
     if is_estimated and rivals > CONFUSED and not choice.stitch:
-        return _without_common(detections, model) or choice
+        return without_motion_in_common(detections, model) or choice
     return choice
 
 
@@ -190,29 +190,46 @@ def _quick_tracks(detections: Detections, model: TrackingModel) -> tuple[Tracks,
     return tracks, max(state.info["candidates"] / max(n_links, 1) - 1, 0.0)
 
 
-def _without_common(detections: Detections, model: TrackingModel) -> Choice | None:
-    """Return the choice without the motion in common, None if that explains too little."""
+def without_motion_in_common(detections: Detections, model: TrackingModel | None) -> Choice | None:
+    """Return the choice without the motion in common, None if that explains too little.
+
+    Parameters
+    ----------
+    detections : Detections
+        Capture.
+    model : TrackingModel or None
+        Its model; None if none can be estimated, so that nothing is left to compare with.
+    """
+    if model is None:
+        why = "as no marker is nearer to its next position than to others"
+    elif gain := _gain_without(detections, model):
+        why = f"detections are more probable by {gain:.2g} nats each"
+    else:
+        return None
+    still = without_common_motion(detections)
+    try:
+        estimate = estimate_model(still)
+    except ParameterError:
+        return None
+    choice = choose_method(still, estimate.model, is_estimated=False)
+    reason = f"without the motion that most markers have in common, {why}, {choice.reason}"
+    return replace(choice, reason=reason, estimate=estimate)
+
+
+def _gain_without(detections: Detections, model: TrackingModel) -> float:
+    """Return the gain in log density per detection without the motion in common; 0 for none."""
     n_frames = detections.n_frames * MAX_COMPARED // max(detections.n_points, 1)
-    part = detections.part(0, max(min(n_frames, detections.n_frames), MIN_TOGETHER))
+    part = detections.part(0, max(min(n_frames, detections.n_frames), MIN_TOGETHER)).measured()
     still = without_common_motion(part)
     try:
         model_of_rest = estimate_model(still).model
     except ParameterError:
-        return None
+        return 0.0
     found = _quick_tracks(still, model_of_rest)[0]
     gain = _log_density(found, model_of_rest) - _log_density(_quick_tracks(part, model)[0], model)
     D, T = part.n_axes, part.n_frames
     cost = T * D * (D + 1) / 2 * 0.5 * math.log(max(part.n_points / T, 1))
-    if gain <= cost:
-        return None
-    whole = without_common_motion(detections)
-    estimate = estimate_model(whole)
-    choice = choose_method(whole, estimate.model, is_estimated=False)
-    reason = (
-        f"without the motion that all markers have in common, detections are more probable by "
-        f"{gain / part.n_points:.2g} nats each, {choice.reason}"
-    )
-    return replace(choice, reason=reason, estimate=estimate)
+    return gain / part.n_points if gain > cost else 0.0
 
 
 def _log_density(tracks: Tracks, model: TrackingModel) -> float:

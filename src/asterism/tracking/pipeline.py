@@ -11,10 +11,9 @@ from asterism.errors import ParameterError
 from asterism.model import Detections, Edit, MarkerSet, Recipe, TrackingModel, Tracks
 from asterism.model.recipe import hash_of_edits, sha256_of, versions
 from asterism.records import record
-from asterism.tracking.attempts.most_certain import attempt, most_certain
+from asterism.tracking.attempts.most_certain import carried_out
 from asterism.tracking.correction import correct, settled
 from asterism.tracking.decisions import of_filling, of_naming, of_stitching
-from asterism.tracking.estimation import without_common_motion
 from asterism.tracking.filling import LONGEST, fill_gaps
 from asterism.tracking.history import model_of
 from asterism.tracking.naming import name_tracks
@@ -224,12 +223,7 @@ def without_edits(
         As for `carry_out`.
     """
     _warn_of_versions(recipe)
-    make = most_certain if recipe.retry else attempt
-    seen = without_common_motion(detections) if recipe.common_motion else detections
-    found = make(recipe, seen, method, start=start, progress=progress)
-    if recipe.common_motion:
-        tracks = dataclasses.replace(found.tracks, detections=detections.measured())
-        found = dataclasses.replace(found, tracks=tracks, still=seen)
+    found = carried_out(recipe, detections, method, start=start, progress=progress)
     if not recipe.markers:
         return found
     naming = name_tracks(found.tracks, *(marker_sets or ()))

@@ -12,8 +12,8 @@ from asterism.errors import ParameterError
 from asterism.model import Capture, Detections, Edit, MarkerSet, Recipe, TrackingModel, Tracks
 from asterism.model.recipe import InputHash, hash_of_edits, versions
 from asterism.records import record
-from asterism.tracking.choose import choose_method
-from asterism.tracking.estimation import estimate_model, without_common_motion
+from asterism.tracking.choose import Choice, choose_method, without_motion_in_common
+from asterism.tracking.estimation import estimate_model
 from asterism.tracking.methods import SMP, Method, method_by_name, options_of
 from asterism.tracking.naming.own_names import has_own_names
 
@@ -23,13 +23,6 @@ if TYPE_CHECKING:
     from asterism.tracking.estimation import ModelEstimate
 
 __all__ = ["Plan", "hash_of_names", "plan_tracking"]
-
-
-UNFOLLOWED = (
-    "without the motion that all markers have in common, as none is nearer to its next position "
-    "than to others"
-)
-"""Reason for it where no model can be estimated with this motion."""
 
 
 @record
@@ -124,26 +117,25 @@ def plan_tracking(
         _check_start(start, detections)
     for each in edits:
         check_kind("edits", each, Edit, "asterism.io.read_edits(path, detections)")
-    estimate, seen = None, detections
-    if model is None and method is None and start is None:
-        estimate, seen = _estimated(detections)
-        model = estimate.model
-    elif model is None:
-        estimate = estimate_model(detections)
+    estimate = choice = None
+    if model is None:
+        estimate, choice = _estimated(detections, is_free=method is None and start is None)
         model = estimate.model
     check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
-    reason, is_chosen, common_motion = "", method is None, seen is not detections
-    if method is None and stitch is True and start is None:
-        method, reason = SMP(window=3), "stitching is requested"
-    elif method is None:
-        is_estimated = estimate is not None and not common_motion
-        choice = choose_method(seen, model, has_start=start is not None, is_estimated=is_estimated)
-        method, reason = choice.method, choice.reason
+    is_chosen = method is None
+    if choice is None and is_chosen:
+        if stitch is True and start is None:
+            choice = Choice(method=SMP(window=3), stitch=True, reason="stitching is requested")
+        else:
+            choice = choose_method(
+                detections, model, has_start=start is not None, is_estimated=estimate is not None
+            )
+    if choice is not None:
+        method = choice.method
         stitch = choice.stitch if stitch == "auto" else stitch
         if choice.estimate is not None:
-            common_motion, estimate, model = True, choice.estimate, choice.estimate.model
-    if seen is not detections:
-        reason = f"{UNFOLLOWED}, {reason}"
+            estimate, model = choice.estimate, choice.estimate.model
+    assert method is not None
     recipe = Recipe(
         method=method.name,
         options=options_of(method),
@@ -151,32 +143,27 @@ def plan_tracking(
         stitch=stitch is True,
         seed=seed,
         has_start=start is not None,
-        reason=reason,
+        reason="" if choice is None else choice.reason,
         markers=hash_of_names(detections, marker_sets),
         edits=hash_of_edits(edits),
         fill=fill,
         input_hash=InputHash((detections, None if start is None else start.labels)),
         versions=versions(),
         retry=is_chosen and stitch is True and start is None,
-        common_motion=common_motion,
+        common_motion=choice is not None and choice.estimate is not None,
     )
     return Plan(recipe=recipe, method=method, estimate=estimate)
 
 
-def _estimated(detections: Detections) -> tuple[ModelEstimate, Detections]:
-    """Return a model and the capture for which it holds.
-
-    Where all markers move so far together that no point can be followed to the next frame, it is
-    the capture without this motion.
-    """
+def _estimated(detections: Detections, *, is_free: bool) -> tuple[ModelEstimate, Choice | None]:
+    """Estimate the model of a capture as it is, or, if it cannot be, without a motion in common."""
     try:
-        return estimate_model(detections), detections
-    except ParameterError as error:
-        still = without_common_motion(detections)
-        try:
-            return estimate_model(still), still
-        except ParameterError:
-            raise error from None
+        return estimate_model(detections), None
+    except ParameterError:
+        choice = without_motion_in_common(detections, None) if is_free else None
+        if choice is None or choice.estimate is None:
+            raise
+        return choice.estimate, choice
 
 
 def _check_start(start: Tracks, detections: Detections) -> None:

@@ -12,7 +12,13 @@ from typing import TYPE_CHECKING, Any
 from asterism.tracking.attempts.own_distances import assigned_again, refined_by_own_distances
 from asterism.tracking.attempts.slow_start import after_slow_start, with_slow_start
 from asterism.tracking.attempts.uncorrected import DOUBTFUL, Uncorrected
-from asterism.tracking.estimation import OVER_THREE_FRAMES, fit_body_motion, fit_to_tracks
+from asterism.tracking.choose import without_motion_in_common
+from asterism.tracking.estimation import (
+    OVER_THREE_FRAMES,
+    fit_body_motion,
+    fit_to_tracks,
+    without_common_motion,
+)
 from asterism.tracking.methods import GNN, METHODS, TOMHT, Rigidity, method_by_name, options_of
 from asterism.tracking.methods.associate import associate
 from asterism.tracking.stitching import stitch, tracklet_model
@@ -23,10 +29,34 @@ if TYPE_CHECKING:
     from asterism.model import Detections, Recipe, TrackingModel, Tracks
     from asterism.tracking.methods import Method
 
-__all__ = ["attempt", "most_certain"]
+__all__ = ["carried_out", "most_certain"]
 
 MAX_PASSES = 4
 """Largest number of passes over the capture."""
+
+
+def carried_out(
+    recipe: Recipe,
+    detections: Detections,
+    method: Method[Any] | None = None,
+    *,
+    start: Tracks | None = None,
+    progress: Callable[[int], Any] | None = None,
+) -> Uncorrected:
+    """Carry out the association and the stitching of a recipe, and its further attempts.
+
+    Parameters
+    ----------
+    recipe, detections, method, start, progress
+        As for `asterism.tracking.carry_out`.
+    """
+    make = most_certain if recipe.retry else attempt
+    if not recipe.common_motion:
+        return make(recipe, detections, method, start=start, progress=progress)
+    still = without_common_motion(detections)
+    found = make(recipe, still, method, start=start, progress=progress)
+    tracks = dataclasses.replace(found.tracks, detections=detections.measured())
+    return dataclasses.replace(found, tracks=tracks, still=still)
 
 
 def attempt(
@@ -109,8 +139,10 @@ def most_certain(
     with bonds must be more certain by `DOUBTFUL`, because it uses distances as the confidence does.
     Then further passes follow (`next_pass`), until one is not more certain. The best is
     `assigned_again`. If it has bonds and identities are still uncertain, so is an attempt with the
-    motion in tracks of single frames, and the more certain of both is the result. For `progress`,
-    the first method is half of the work, and every other attempt or pass half of what is left.
+    motion in tracks of single frames, and the more certain of both is the result. If that is still
+    uncertain, and detections are more probable without the motion that most markers have in common,
+    all this is done without it, which must be more certain by `DOUBTFUL`. For `progress`, the first
+    method is half of the work, and every other attempt or pass half of what is left.
 
     Parameters
     ----------
@@ -134,7 +166,8 @@ def most_certain(
     first = attempt(recipe, detections, method, start=start, progress=half_of_rest())
     best = first
     # A recipe by `TOMHT`, or with several passes, is that of a further attempt already.
-    if best.is_doubtful and recipe.method != TOMHT.name and recipe.passes == 1:
+    is_first = recipe.method != TOMHT.name and recipe.passes == 1
+    if best.is_doubtful and is_first:
         bodies = _by_bonds(recipe, detections, OVER_THREE_FRAMES, half_of_rest())
         if bodies is not None:
             best = _more_certain(first, bodies, DOUBTFUL * detections.n_points)
@@ -150,6 +183,11 @@ def most_certain(
             best = _more_certain(best, assigned_again(bodies), 0)
     else:
         best = assigned_again(refined_by_own_distances(first))
+    if best.is_doubtful and is_first and not recipe.common_motion:
+        other = _without_motion_in_common(recipe, detections, half_of_rest())
+        if other is not None:
+            other = _with_reason(other, best)
+            best = _more_certain(best, other, DOUBTFUL * detections.n_points)
     if progress is not None:
         progress(n)
     return best
@@ -183,6 +221,23 @@ def _by_bonds(
     return _by(TOMHT(rigid=Rigidity()), bodies, detections, progress)
 
 
+def _without_motion_in_common(
+    recipe: Recipe, detections: Detections, progress: Callable[[int], Any]
+) -> Uncorrected | None:
+    """Track without the motion that most markers have in common; None if it explains too little."""
+    choice = without_motion_in_common(detections, recipe.model)
+    # Bodies are still bodies then, and confidence from their distances is comparable.
+    if choice is None or choice.estimate is None or not choice.stitch:
+        return None
+    other = dataclasses.replace(
+        recipe, method=choice.method.name, options=options_of(choice.method),
+        model=choice.estimate.model, reason=choice.reason, common_motion=True,
+    )  # fmt: skip
+    found = carried_out(other, detections, progress=progress)
+    recipe = dataclasses.replace(found.recipe, reason=choice.reason)
+    return dataclasses.replace(found, recipe=recipe)
+
+
 def _more_certain(before: Uncorrected, other: Uncorrected, margin: float) -> Uncorrected:
     """Return the other result if it is more certain by a number of detections."""
     return other if other.expected_right > before.expected_right + margin else before
@@ -191,12 +246,13 @@ def _more_certain(before: Uncorrected, other: Uncorrected, margin: float) -> Unc
 def _with_reason(best: Uncorrected, first: Uncorrected) -> Uncorrected:
     """Return the best result with the reason for it, if a further attempt made it."""
     recipe, other = best.recipe, first.recipe
-    if (recipe.options, recipe.label) == (other.options, other.label):
+    is_still = recipe.common_motion and not other.common_motion
+    if (recipe.options, recipe.label) == (other.options, other.label) and not is_still:
         return best
     share, less = (100 * each.expected_right / len(each.tracks.labels) for each in (best, first))
     reason = (
-        f"{other.reason}; {share:.1f} % of the detections are expected to have the right "
-        f"identity, against {less:.1f} % with {other.label}"
+        f"{recipe.reason}; {share:.1f} % of the detections are expected to have the right "
+        f"identity, against {less:.1f} % with {other.label}" + " and this motion" * is_still
     )
     recipe = dataclasses.replace(recipe, reason=reason)
     tracks = dataclasses.replace(best.tracks, recipe=recipe)

@@ -53,7 +53,7 @@ def refined_by_own_distances(found: Uncorrected) -> Uncorrected:
     names = tuple(f"M{k}" if own else None for k, own in enumerate(is_present))
     named, best = dataclasses.replace(tracks, names=names), found
     for n in range(1, MAX_ROUNDS + 1):
-        if not best.is_doubtful:
+        if not best.is_doubtful or not any(named.names):
             break
         named = name_tracks(named, learn_marker_set(named)).tracks
         renamed = _with_labels(found, named.labels, n)

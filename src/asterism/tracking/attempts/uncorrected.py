@@ -43,8 +43,8 @@ class Uncorrected:
     naming : Naming, optional
         Names with their probabilities.
     still : Detections, optional
-        The same detections without the motion that all markers have in common, if the model and the
-        stitching are those of this rest.
+        The same detections without the motion that most markers have in common, if the model and
+        the stitching hold for these coordinates.
     """
 
     tracks: Tracks

@@ -36,6 +36,8 @@ MAX_UNSEEN = 5
 """Number of frames without a detection after which a point is dropped."""
 MAX_SHIFTED = 60
 """Largest number of detections of a frame whose pairs are searched for everywhere."""
+N_SHIFTED = 8
+"""About the number of these detections, one of which is at its known point after the shift."""
 DOUBTFUL, LOST = 0.5, 0.2
 """Agreement of a fit, 0 to 1, below which another one is searched for, and below which there is no
 fit: the share of the detections that are paired, less for each the squared distance of the pair
@@ -184,7 +186,8 @@ def _shift(
     z: NDArray[np.float64], known: NDArray[np.float64], tree: KDTree, apart: float
 ) -> NDArray[np.float64]:
     """Return the difference of a known point and a detection by which most others are paired."""
-    shifts = (known[:, None] - z).reshape(-1, z.shape[1])
+    some = z[:: max(len(z) // N_SHIFTED, 1)]
+    shifts = (known[:, None] - some).reshape(-1, z.shape[1])
     distance = np.asarray(tree.query(shifts[:, None] + z, distance_upper_bound=apart)[0])
     near = np.maximum(1 - (distance / apart) ** 2, 0).sum(axis=1)
     return shifts[near.argmax()]
