@@ -245,6 +245,36 @@ def test_edits_are_made_in_the_coordinates_of_the_capture(tmp_path):
     assert np.array_equal(again.labels, result.labels)
 
 
+def hand(seed):
+    """A hand with moving fingers, 3 mm of noise, that moves as a whole by 11 mm a frame."""
+    fingers = am.simulate.fingers(frames=300, rate=120, seed=seed)
+    rng = np.random.default_rng(seed)
+    t = np.arange(300)[:, None, None] / 120
+    common = 0.2 * np.sin(2 * np.pi * (rng.uniform(1, 2, 3) * t + rng.uniform(size=3)))
+    take = am.Tracks.from_dense(t[:, 0, 0], fingers.positions() + common)
+    return am.simulate.corrupt(take, missing=0.1, clutter=0.1, noise=3e-3, seed=seed)
+
+
+def test_uncertain_bodies_are_tracked_without_it_if_that_is_more_certain():
+    truth = hand(2)
+    plan = am.tracking.plan_tracking(truth.detections)
+    assert plan.recipe.stitch
+    assert not plan.recipe.common_motion  # it has bodies
+    found = am.track(truth.detections)
+    assert found.recipe.common_motion
+    assert found.recipe.reason.startswith("without the motion that most markers have in common")
+    assert "and this motion" in found.recipe.reason
+    assert am.evaluate(found, truth).idf1 > 0.99
+    again = am.track(truth.detections, recipe=found.recipe)
+    assert again.recipe == found.recipe
+    assert np.array_equal(again.labels, found.labels)
+    with pytest.MonkeyPatch.context() as patch:
+        name = "asterism.tracking.attempts.most_certain.without_motion_in_common"
+        patch.setattr(name, lambda *_: None)
+        with_it = am.track(truth.detections)
+    assert am.evaluate(found, truth).idf1 > am.evaluate(with_it, truth).idf1
+
+
 def test_independent_markers_and_people_are_tracked_as_they_are(monkeypatch):
     monkeypatch.setattr("asterism.tracking.choose.CONFUSED", 0.0)
     person = am.simulate.person(frames=120, seed=1)

@@ -541,3 +541,34 @@ def test_json_holds_the_choice_and_auto_may_be_named(person, capsys):
     report = json.loads(capsys.readouterr().out)
     assert "chosen" not in report
     assert (report["method"], report["stitch"]) == ("gnn", False)
+
+
+@pytest.mark.parametrize(
+    ("is_crowded", "shares", "expected", "kept"),
+    [
+        (False, {}, ["smp", "bonds", "tomht"], "tomht"),
+        (True, {}, ["smp", "bonds", "tomht", "mcmcda"], "tomht"),
+        (True, {"mcmcda": 0.803}, ["smp", "bonds", "tomht", "mcmcda"], "mcmcda"),
+    ],
+)
+def test_a_crowded_capture_is_searched_by_mcmcda_which_needs_a_margin(
+    is_crowded, shares, expected, kept, monkeypatch
+):
+    walk = am.simulate.person(activity="walk", frames=60, seed=1)
+    recipe = am.tracking.plan_tracking(walk.detections).recipe
+    shares = {"smp": 0.7, "tomht": 0.8, "bonds": 0.7, "mcmcda": 0.801} | shares
+    monkeypatch.setattr(Planned, "shares", shares)
+    made = []
+
+    def planned(recipe, *_, **__):
+        made.append("bonds" if recipe.options.get("rigid") else recipe.method)
+        return Planned(tracks=walk, recipe=recipe, model=recipe.model)
+
+    monkeypatch.setattr(f"{MOST_CERTAIN}.attempt", planned)
+    monkeypatch.setattr(f"{MOST_CERTAIN}.refined_by_own_distances", lambda found: found)
+    monkeypatch.setattr(f"{MOST_CERTAIN}.assigned_again", lambda found: found)
+    monkeypatch.setattr(f"{MOST_CERTAIN}.is_crowded", lambda *_: is_crowded)
+    monkeypatch.setattr(f"{MOST_CERTAIN}.without_motion_in_common", lambda *_: None)
+    best = most_certain(recipe, walk.detections)
+    assert made == expected
+    assert best.recipe.method == kept

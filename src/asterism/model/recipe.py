@@ -103,7 +103,8 @@ class Recipe:
     retry : bool
         Whether identities that are uncertain are estimated in further ways: by another method, and
         by a marker set learnt from the tracks. The most certain result is kept, and its recipe
-        names the method that made it.
+        names the method that made it. `MCMCDA` searches with ever more moves, until two independent
+        searches agree; the recipe is that of the most probable result.
     passes : int
         Number of passes of the method over the capture. Before each further pass it learns bonds
         from the tracks of the pass before.

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from asterism.tracking.estimation import ModelEstimate
     from asterism.tracking.methods.base import Method
 
-__all__ = ["AUTO", "Choice", "choose_method", "without_motion_in_common"]
+__all__ = ["AUTO", "CROWDED", "Choice", "choose_method", "is_crowded", "without_motion_in_common"]
 
 AUTO = "auto"
 """Name on the command line for the automatic selection of a method."""
@@ -55,7 +55,12 @@ CLEAR = 0.01
 
 CONFUSED = 1.0
 """Smallest number of rival detections per link at which the tracks of GNN do not tell whether there
-are bodies, so that `fit_body_motion` does, and at which a motion in common is searched for."""
+are bodies, so that `fit_body_motion` does, and at which markers without bodies are tried without
+the motion in common."""
+CROWDED = 0.5
+"""Smallest number of rival detections per link at which `MCMCDA` searches until two searches agree,
+and at which uncertain identities of bodies are estimated by it, and without the motion in common.
+"""
 MAX_COMPARED = 20_000
 """Number of detections at the beginning of a capture that show whether there is one."""
 
@@ -72,6 +77,8 @@ class Choice:
         Whether the tracklets of the method are to be stitched.
     reason : str
         What was measured in the capture and what follows from it, in one line.
+    rivals : float
+        Number of rival detections per link.
     estimate : ModelEstimate, optional
         Model of the capture without the motion that its markers have in common, if it is to be
         tracked without (`without_common_motion`).
@@ -90,6 +97,7 @@ class Choice:
     method: Method[Any]
     stitch: bool
     reason: str
+    rivals: float = 0.0
     estimate: ModelEstimate | None = None
 
 
@@ -150,7 +158,7 @@ def choose_method(
         return Choice(method=MCMCDA(), stitch=False, reason="initial tracks are given")
     detections = detections.measured()
     tracks, rivals = _quick_tracks(detections, model)
-    choice = _as_it_is(tracks, model, rivals)
+    choice = replace(_as_it_is(tracks, model, rivals), rivals=rivals)
     # Bodies that move apart would be lost in the coordinates of one of them: see `most_certain`.
     if is_estimated and rivals > CONFUSED and not choice.stitch:
         return without_motion_in_common(detections, model) or choice
@@ -188,6 +196,19 @@ def _quick_tracks(detections: Detections, model: TrackingModel) -> tuple[Tracks,
     tracks = Tracks(detections=detections, labels=labels)
     n_links = int(tracks.lengths.sum()) - tracks.n_tracks
     return tracks, max(state.info["candidates"] / max(n_links, 1) - 1, 0.0)
+
+
+def is_crowded(detections: Detections, model: TrackingModel) -> bool:
+    """Return whether links of a capture have at least `CROWDED` rival detections.
+
+    Parameters
+    ----------
+    detections : Detections
+        Capture.
+    model : TrackingModel
+        Its model.
+    """
+    return _quick_tracks(detections.measured(), model)[1] >= CROWDED
 
 
 def without_motion_in_common(detections: Detections, model: TrackingModel | None) -> Choice | None:

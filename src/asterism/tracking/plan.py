@@ -12,9 +12,9 @@ from asterism.errors import ParameterError
 from asterism.model import Capture, Detections, Edit, MarkerSet, Recipe, TrackingModel, Tracks
 from asterism.model.recipe import InputHash, hash_of_edits, versions
 from asterism.records import record
-from asterism.tracking.choose import Choice, choose_method, without_motion_in_common
+from asterism.tracking.choose import CROWDED, Choice, choose_method, without_motion_in_common
 from asterism.tracking.estimation import estimate_model
-from asterism.tracking.methods import SMP, Method, method_by_name, options_of
+from asterism.tracking.methods import MCMCDA, SMP, Method, method_by_name, options_of
 from asterism.tracking.naming.own_names import has_own_names
 
 if TYPE_CHECKING:
@@ -132,10 +132,13 @@ def plan_tracking(
             )
     if choice is not None:
         method = choice.method
+        if stitch is True and not choice.stitch and start is None:
+            method = SMP(window=3)
         stitch = choice.stitch if stitch == "auto" else stitch
         if choice.estimate is not None:
             estimate, model = choice.estimate, choice.estimate.model
     assert method is not None
+    is_searched = choice is not None and choice.rivals > CROWDED and method.name == MCMCDA.name
     recipe = Recipe(
         method=method.name,
         options=options_of(method),
@@ -149,7 +152,7 @@ def plan_tracking(
         fill=fill,
         input_hash=InputHash((detections, None if start is None else start.labels)),
         versions=versions(),
-        retry=is_chosen and stitch is True and start is None,
+        retry=is_chosen and start is None and (stitch is True or is_searched),
         common_motion=choice is not None and choice.estimate is not None,
     )
     return Plan(recipe=recipe, method=method, estimate=estimate)
