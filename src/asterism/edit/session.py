@@ -13,9 +13,9 @@ from asterism.errors import FormatError, ParameterError
 from asterism.io import read_edits, write, write_edits
 from asterism.model import Decision, Detections, Edit, Recipe
 from asterism.model.recipe import sha256_of
-from asterism.tracking import Correction, Tracked, assess, fill_gaps, plan_tracking
+from asterism.tracking import Correction, Tracked, fill_gaps, plan_tracking
 from asterism.tracking.correction import settled
-from asterism.tracking.history import model_of
+from asterism.tracking.estimation import model_of
 from asterism.tracking.pipeline import conclude, without_edits
 
 if TYPE_CHECKING:
@@ -304,9 +304,7 @@ class Session:
         edits : sequence of Edit
             Edits that held then.
         """
-        begun = self.begun
-        found = assess(begun.as_modelled(tracks), begun.model, begun.stitching)
-        return settled(begun.as_captured(found), edits)
+        return settled(dataclasses.replace(self.begun, tracks=tracks).assessed, edits)
 
     def fill_preview(
         self, track: int, first: int, last: int

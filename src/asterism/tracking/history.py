@@ -9,9 +9,9 @@ import numpy as np
 from asterism.checks import check_kind
 from asterism.errors import ParameterError
 from asterism.filter import States, smooth_states
-from asterism.model import Recipe, TrackingModel, Tracks
+from asterism.model import TrackingModel, Tracks
 from asterism.records import record
-from asterism.tracking.estimation import fit_to_capture
+from asterism.tracking.estimation import model_of
 from asterism.tracking.methods import TrackStates
 
 if TYPE_CHECKING:
@@ -125,19 +125,6 @@ class TrackHistory:
         frame = states.first_frames[track] + row - states.offsets[track]
         dense[frame, track] = states.means[:, :, state]
         return dense
-
-
-def model_of(tracks: Tracks, recipe: Recipe) -> TrackingModel:
-    """Return the model that holds for tracks in the coordinates of their capture.
-
-    Parameters
-    ----------
-    tracks : Tracks
-        Tracks of a recipe.
-    recipe : Recipe
-        Recipe, whose model may be that of the capture without its common motion.
-    """
-    return fit_to_capture(tracks, recipe.model) if recipe.common_motion else recipe.model
 
 
 def track_states(tracks: Tracks, *, model: TrackingModel | None = None) -> TrackHistory:

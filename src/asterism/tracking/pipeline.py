@@ -14,8 +14,8 @@ from asterism.records import record
 from asterism.tracking.attempts.most_certain import carried_out
 from asterism.tracking.correction import correct, settled
 from asterism.tracking.decisions import of_filling, of_naming, of_stitching
+from asterism.tracking.estimation import model_of
 from asterism.tracking.filling import LONGEST, fill_gaps
-from asterism.tracking.history import model_of
 from asterism.tracking.naming import name_tracks
 from asterism.tracking.plan import hash_of_names, plan_tracking
 
