@@ -118,7 +118,7 @@ def test_the_result_is_that_of_track_with_the_same_edits(session, capture):
 
 def test_a_preview_is_what_a_fill_gives(session):
     gap = next(each for each in session.tracks.gaps() if each.seconds < 0.2)
-    positions, sigma = session.fill_preview(gap.track, gap.first, gap.last)
+    positions, sigma = session.fill_preview(session.fill(gap.track, gap.first, gap.last))
     assert positions.shape == (gap.length, 3)
     assert (sigma > 0).all()
     session.apply(session.fill(gap.track, gap.first, gap.last))

@@ -10,6 +10,7 @@ import pytest
 import asterism as am
 from asterism.edit.session import Session
 from asterism.errors import ParameterError
+from asterism.tracking.choose import without_motion_in_common
 from asterism.tracking.estimation.common_motion import MIN_PAIRS
 
 
@@ -171,7 +172,7 @@ def test_gaps_and_states_need_no_model_that_cannot_be_estimated(tmp_path):
     assert am.tracking.track_states(found.measured()).at(100).positions.shape == (19, 3)
     session = Session.open(truth.detections, tmp_path / "edits.csv")
     gap = session.tracks.gaps()[0]
-    positions, _ = session.fill_preview(gap.track, gap.first, gap.last)
+    positions, _ = session.fill_preview(session.fill(gap.track, gap.first, gap.last))
     assert np.isfinite(positions).all()
 
 
@@ -273,6 +274,15 @@ def test_uncertain_bodies_are_tracked_without_it_if_that_is_more_certain():
         patch.setattr(name, lambda *_: None)
         with_it = am.track(truth.detections)
     assert am.evaluate(found, truth).idf1 > am.evaluate(with_it, truth).idf1
+
+
+def test_a_motion_that_explains_less_than_it_costs_stays(monkeypatch):
+    take = am.simulate.fingers(frames=300, rate=120, seed=1)  # its wrist moves by 1 mm a frame
+    d = am.simulate.corrupt(take, noise=3e-3, seed=1).detections
+    model = am.estimate_model(d).model
+    assert without_motion_in_common(d, model) is None
+    monkeypatch.setattr("asterism.tracking.choose.COST", 0.0)
+    assert without_motion_in_common(d, model) is not None
 
 
 def test_independent_markers_and_people_are_tracked_as_they_are(monkeypatch):

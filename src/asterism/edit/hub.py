@@ -191,7 +191,8 @@ class Hub:
     async def _preview(self, message: Message) -> dict[str, Any]:
         async with self._lock:
             track, first, last = self._gap(message)
-            points, sigma = await asyncio.to_thread(self.session.fill_preview, track, first, last)
+            edit = self.session.fill(track, first, last)
+            points, sigma = await asyncio.to_thread(self.session.fill_preview, edit)
         return {
             "track": track, "first": first + self.view.shift, "last": last + self.view.shift,
             "points": np.round(points, 5).tolist(), "sigma": np.round(sigma, 6).tolist(),

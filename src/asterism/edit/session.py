@@ -194,8 +194,7 @@ class Session:
 
     def undo(self) -> Change | None:
         """Take back the last edit, and return what it had changed; None without one."""
-        edits = self.edits
-        if not edits:
+        if not (edits := self.edits):
             return None
         self._write(edits[:-1])
         self._undone.append(edits[-1])
@@ -306,17 +305,13 @@ class Session:
         """
         return settled(dataclasses.replace(self.begun, tracks=tracks).assessed, edits)
 
-    def fill_preview(
-        self, track: int, first: int, last: int
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def fill_preview(self, edit: Edit) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the positions by which a gap would be filled, and their standard deviations.
 
         Parameters
         ----------
-        track : int
-            Track with the gap.
-        first, last : int
-            First and last frame of the gap.
+        edit : Edit
+            Edit that fills the gap, as of `fill`.
 
         Returns
         -------
@@ -325,14 +320,11 @@ class Session:
         sigma : ndarray of shape (n,)
             Standard deviation of a coordinate, metres.
         """
-        edit = self.fill(track, first, last)
         model = model_of(self.tracks, self.begun.recipe)
-        tracks = fill_gaps(self.tracks, model=model, longest=0.0, edits=(edit,)).tracks
-        d = tracks.detections
+        d = fill_gaps(self.tracks, model=model, longest=0.0, edits=(edit,)).tracks.detections
         if d.filled is None or d.stds is None:
-            raise ParameterError("track", "a gap of these frames", f"track {track}")
-        own = np.flatnonzero(d.filled & (tracks.labels == track))
-        return d.points[own], d.stds[own]
+            raise ParameterError("edit", "one that fills a gap", edit)
+        return d.points[d.filled], d.stds[d.filled]
 
     def fill(self, track: int, first: int, last: int, kind: Any = "fill") -> Edit:
         """Return the edit that fills a gap, or leaves it open.

@@ -61,6 +61,9 @@ CROWDED = 0.5
 """Smallest number of rival detections per link at which `MCMCDA` searches until two searches agree,
 and at which uncertain identities of bodies are estimated by it, and without the motion in common.
 """
+COST = 0.5
+"""Cost of a coordinate or an angle of a motion in common, in the logarithm of the number of
+detections of a frame (BIC), nats."""
 MAX_COMPARED = 20_000
 """Number of detections at the beginning of a capture that show whether there is one."""
 
@@ -249,7 +252,7 @@ def _gain_without(detections: Detections, model: TrackingModel) -> float:
     found = _quick_tracks(still, model_of_rest)[0]
     gain = _log_density(found, model_of_rest) - _log_density(_quick_tracks(part, model)[0], model)
     D, T = part.n_axes, part.n_frames
-    cost = T * D * (D + 1) / 2 * 0.5 * math.log(max(part.n_points / T, 1))
+    cost = T * D * (D + 1) / 2 * COST * math.log(max(part.n_points / T, 1))
     return gain / part.n_points if gain > cost else 0.0
 
 
