@@ -11,7 +11,7 @@ import asterism as am
 from asterism.tracking.attempts import agreed
 from asterism.tracking.attempts.halves import Halves
 from asterism.tracking.attempts.uncorrected import Uncorrected
-from asterism.tracking.choose import CROWDED
+from asterism.tracking.choose import CONFUSED
 
 
 def crowded(seed=1):
@@ -77,7 +77,7 @@ def test_few_rivals_need_one_search():
     d = am.simulate.corrupt(truth, missing=0.1, clutter=0.1, noise=0.005, seed=1).detections
     plan = am.tracking.plan_tracking(d)
     choice = am.tracking.choose_method(d, plan.recipe.model)
-    assert 0 < choice.rivals < CROWDED
+    assert 0 < choice.rivals < CONFUSED
     assert (plan.recipe.method, plan.recipe.retry) == ("mcmcda", False)
 
 

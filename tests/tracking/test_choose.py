@@ -544,7 +544,7 @@ def test_json_holds_the_choice_and_auto_may_be_named(person, capsys):
 
 
 @pytest.mark.parametrize(
-    ("is_crowded", "shares", "expected", "kept"),
+    ("has_many_rivals", "shares", "expected", "kept"),
     [
         (False, {}, ["smp", "bonds", "tomht"], "tomht"),
         (True, {}, ["smp", "bonds", "tomht", "mcmcda"], "tomht"),
@@ -552,7 +552,7 @@ def test_json_holds_the_choice_and_auto_may_be_named(person, capsys):
     ],
 )
 def test_a_crowded_capture_is_searched_by_mcmcda_which_needs_a_margin(
-    is_crowded, shares, expected, kept, monkeypatch
+    has_many_rivals, shares, expected, kept, monkeypatch
 ):
     walk = am.simulate.person(activity="walk", frames=60, seed=1)
     recipe = am.tracking.plan_tracking(walk.detections).recipe
@@ -567,7 +567,7 @@ def test_a_crowded_capture_is_searched_by_mcmcda_which_needs_a_margin(
     monkeypatch.setattr(f"{MOST_CERTAIN}.attempt", planned)
     monkeypatch.setattr(f"{MOST_CERTAIN}.refined_by_own_distances", lambda found: found)
     monkeypatch.setattr(f"{MOST_CERTAIN}.assigned_again", lambda found: found)
-    monkeypatch.setattr(f"{MOST_CERTAIN}.is_crowded", lambda *_: is_crowded)
+    monkeypatch.setattr(f"{MOST_CERTAIN}.has_many_rivals", lambda *_: has_many_rivals)
     monkeypatch.setattr(f"{MOST_CERTAIN}.without_motion_in_common", lambda *_: None)
     best = most_certain(recipe, walk.detections)
     assert made == expected

@@ -31,7 +31,14 @@ if TYPE_CHECKING:
     from asterism.tracking.estimation import ModelEstimate
     from asterism.tracking.methods.base import Method
 
-__all__ = ["AUTO", "CROWDED", "Choice", "choose_method", "is_crowded", "without_motion_in_common"]
+__all__ = [
+    "AUTO",
+    "CONFUSED",
+    "Choice",
+    "choose_method",
+    "has_many_rivals",
+    "without_motion_in_common",
+]
 
 AUTO = "auto"
 """Name on the command line for the automatic selection of a method."""
@@ -54,13 +61,9 @@ CLEAR = 0.01
 """Largest number of rival detections per link at which the association is unambiguous."""
 
 CONFUSED = 1.0
-"""Smallest number of rival detections per link at which the tracks of GNN do not tell whether there
-are bodies, so that `fit_body_motion` does, and at which markers without bodies are tried without
-the motion in common."""
-CROWDED = 0.5
-"""Smallest number of rival detections per link at which `MCMCDA` searches until two searches agree,
-and at which uncertain identities of bodies are estimated by it, and without the motion in common.
-"""
+"""Number of rival detections per link above which the tracks of GNN do not tell whether there are
+bodies, so that `fit_body_motion` does, `MCMCDA` searches longer, and markers without bodies are
+tried without the motion in common."""
 COST = 0.5
 """Cost of a coordinate or an angle of a motion in common, in the logarithm of the number of
 detections of a frame (BIC), nats."""
@@ -201,8 +204,8 @@ def _quick_tracks(detections: Detections, model: TrackingModel) -> tuple[Tracks,
     return tracks, max(state.info["candidates"] / max(n_links, 1) - 1, 0.0)
 
 
-def is_crowded(detections: Detections, model: TrackingModel) -> bool:
-    """Return whether links of a capture have at least `CROWDED` rival detections.
+def has_many_rivals(detections: Detections, model: TrackingModel) -> bool:
+    """Return whether links of a capture have more than `CONFUSED` rival detections.
 
     Parameters
     ----------
@@ -211,7 +214,7 @@ def is_crowded(detections: Detections, model: TrackingModel) -> bool:
     model : TrackingModel
         Its model.
     """
-    return _quick_tracks(detections.measured(), model)[1] >= CROWDED
+    return _quick_tracks(detections.measured(), model)[1] > CONFUSED
 
 
 def without_motion_in_common(detections: Detections, model: TrackingModel | None) -> Choice | None:

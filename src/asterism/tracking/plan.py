@@ -12,7 +12,7 @@ from asterism.errors import ParameterError
 from asterism.model import Capture, Detections, Edit, MarkerSet, Recipe, TrackingModel, Tracks
 from asterism.model.recipe import InputHash, hash_of_edits, versions
 from asterism.records import record
-from asterism.tracking.choose import CROWDED, Choice, choose_method, without_motion_in_common
+from asterism.tracking.choose import CONFUSED, Choice, choose_method, without_motion_in_common
 from asterism.tracking.estimation import estimate_model
 from asterism.tracking.methods import MCMCDA, SMP, Method, method_by_name, options_of
 from asterism.tracking.naming.own_names import has_own_names
@@ -138,7 +138,7 @@ def plan_tracking(
         if choice.estimate is not None:
             estimate, model = choice.estimate, choice.estimate.model
     assert method is not None
-    is_searched = choice is not None and choice.rivals > CROWDED and method.name == MCMCDA.name
+    is_searched = choice is not None and choice.rivals > CONFUSED and method.name == MCMCDA.name
     recipe = Recipe(
         method=method.name,
         options=options_of(method),

@@ -217,7 +217,7 @@ def track(
         with progress("writing the report"):
             write_page(result, report, estimate, summary)
     if prints:
-        if result.recipe.method != recipe.method:
+        if result.recipe.chosen != recipe.chosen:
             print_table([("method", result.recipe.chosen)])
         rows = summary.rows()
         rows += [("report", str(report))] if report is not None else []

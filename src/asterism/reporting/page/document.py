@@ -127,7 +127,7 @@ def _places(contents: Contents, shown: NDArray[np.int64]) -> Markup:
     elif contents.places is None:
         text = "Not known: the tracks have no probabilities of identity."
     elif not contents.places:
-        text = "None: no identity and no name is uncertain."
+        text = "None: no identity and no name is probably wrong."
     else:
         text = "" if len(contents.places) <= MOST_LISTED else f"The worst {MOST_LISTED} are listed."
     listed = uncertain.entries(contents, shown, MOST_LISTED)

@@ -14,7 +14,7 @@ from asterism.tracking.attempts.attempt import attempt, next_pass
 from asterism.tracking.attempts.halves import Halves
 from asterism.tracking.attempts.own_distances import assigned_again, refined_by_own_distances
 from asterism.tracking.attempts.uncorrected import DOUBTFUL, Uncorrected
-from asterism.tracking.choose import is_crowded, without_motion_in_common
+from asterism.tracking.choose import has_many_rivals, without_motion_in_common
 from asterism.tracking.estimation import (
     OVER_THREE_FRAMES,
     fit_body_motion,
@@ -77,10 +77,10 @@ def most_certain(
     Then further passes follow (`next_pass`), until one is not more certain. The best is
     `assigned_again`. If it has bonds and identities are still uncertain, so is an attempt with the
     motion in tracks of single frames, and the more certain of both is the result. If that is still
-    uncertain, and links have many rivals (`is_crowded`), there is an attempt by `MCMCDA`. And where
-    detections are more probable without the motion that most markers have in common, all this is
-    done without it. Both must be more certain by `DOUBTFUL`. For `progress`, the first method is
-    half of the work, and every other attempt or pass half of what is left.
+    uncertain, and links have many rivals (`has_many_rivals`), there is an attempt by `MCMCDA`.
+    Then, where detections are more probable without the motion that most markers have in common,
+    all this is done without it. Both must be more certain by `DOUBTFUL`. For `progress`, the first
+    method is half of the work, and every other attempt or pass half of what is left.
 
     Parameters
     ----------
@@ -88,6 +88,7 @@ def most_certain(
         As for `carry_out`.
     """
     parts = Halves(detections.n_frames, progress)
+    margin = DOUBTFUL * detections.n_points
     first = attempt(recipe, detections, method, start=start, progress=parts.next())
     best = first
     # A recipe by another method, or with several passes, is that of a further attempt already.
@@ -95,7 +96,7 @@ def most_certain(
     if best.is_doubtful and is_first:
         bodies = _by_bonds(recipe, detections, OVER_THREE_FRAMES, parts.next())
         if bodies is not None:
-            best = _more_certain(first, bodies, DOUBTFUL * detections.n_points)
+            best = _more_certain(first, bodies, margin)
         if best is first and not first.has_bonds:
             best = _more_certain(first, _by(TOMHT(), recipe, detections, parts.next()), 0)
         has_bodies = best is bodies
@@ -108,14 +109,13 @@ def most_certain(
             best = _more_certain(best, assigned_again(bodies), 0)
     else:
         best = assigned_again(refined_by_own_distances(first))
-    if best.is_doubtful and is_first and is_crowded(detections, recipe.model):
-        margin = DOUBTFUL * detections.n_points
+    if best.is_doubtful and is_first and has_many_rivals(detections, recipe.model):
         searched = refined_by_own_distances(_by(SEARCH, recipe, detections, parts.next()))
         best = _more_certain(best, _with_reason(assigned_again(searched), first), margin)
-        if not recipe.common_motion:
-            still = _without_motion_in_common(recipe, detections, parts.next())
-            if still is not None:
-                best = _more_certain(best, _with_reason(still, best), margin)
+    if best.is_doubtful and is_first and not recipe.common_motion:
+        still = _without_motion_in_common(recipe, detections, parts.next())
+        if still is not None:
+            best = _more_certain(best, _with_reason(still, best), margin)
     parts.end()
     return best
 
