@@ -39,9 +39,9 @@ def scripted(monkeypatch, log_posteriors):
 @pytest.mark.parametrize(
     ("log_posteriors", "moves", "best", "how"),
     [
-        ([10.0, 10.5], [100], (100, 8), "with 100 moves agree within 1 nat"),
-        ([10.0, 12.0, 14.0, 13.5], [100, 400], (400, 7), "with 400 moves agree within 1 nat"),
-        ([10.0, 20.0, 11.0, 11.0], [100, 400], (100, 8), "with 400 moves agree within 1 nat"),
+        ([10.0, 10.5], [100], (100, 8), "with 100 moves agree within 0.5 nats"),
+        ([10.0, 12.0, 14.0, 13.5], [100, 400], (400, 7), "with 400 moves agree within 0.5 nats"),
+        ([10.0, 20.0, 11.0, 11.0], [100, 400], (100, 8), "with 400 moves agree within 0.0 nats"),
         ([1, 3, 5, 9, 30, 4.5], [100, 400, 1600], (1600, 7), "moves still differ by 25.5 nats"),
     ],
 )
@@ -62,10 +62,13 @@ def test_a_crowded_capture_is_searched_until_searches_agree_and_its_recipe_repea
     truth = crowded()
     plan = am.tracking.plan_tracking(truth.detections)
     assert (plan.recipe.method, plan.recipe.retry) == ("mcmcda", True)
-    found = am.track(truth.detections)
+    reported = []
+    found = am.track(truth.detections, progress=reported.append)
     alone = am.track(truth.detections, am.MCMCDA())
     assert found.info["log_posterior"] > alone.info["log_posterior"]
     assert "two searches" in found.recipe.reason
+    assert reported == sorted(reported)
+    assert reported[-1] == truth.detections.n_frames
     again = am.track(truth.detections, recipe=found.recipe)
     assert again.recipe == found.recipe
     np.testing.assert_array_equal(again.labels, found.labels)
@@ -82,12 +85,12 @@ def test_few_rivals_need_one_search():
 
 
 def test_progress_grows_over_attempts_and_ends_with_the_last_frame():
-    told = []
-    parts = Halves(80, told.append)
+    reported = []
+    parts = Halves(80, reported.append)
     for _ in range(3):
         advance = parts.next()
         for done in (0, 40, 80):
             advance(done)
     parts.end()
-    assert told == [0, 20, 40, 40, 50, 60, 60, 65, 70, 80]
+    assert reported == [0, 20, 40, 40, 50, 60, 60, 65, 70, 80]
     Halves(80, None).next()(3)

@@ -176,6 +176,32 @@ def test_gaps_and_states_need_no_model_that_cannot_be_estimated(tmp_path):
     assert np.isfinite(positions).all()
 
 
+@pytest.mark.parametrize("n_frames", [4, 12, 19])
+def test_short_captures_can_be_tracked(n_frames):
+    person = am.simulate.person(frames=n_frames, seed=1)
+    d = am.simulate.corrupt(person, missing=0.2, clutter=0.2, noise=3e-3, seed=1).detections
+    model = am.estimate_model(person.detections).model
+    assert len(am.track(d, model=model, stitch=True).labels) == d.n_points
+    assert len(am.track(d, model=model).labels) == d.n_points
+
+
+def test_requested_stitching_is_the_reason_for_the_method():
+    recipe = am.tracking.plan_tracking(skin(size=0.25).detections, stitch=True).recipe
+    assert (recipe.method, recipe.stitch, recipe.common_motion) == ("smp", True, True)
+    assert recipe.reason.endswith("stitching is requested")
+
+
+def test_few_points_at_the_beginning_have_the_same_origin():
+    rng = np.random.default_rng(10)
+    positions = moved(rng.uniform(-0.2, 0.2, (10, 3)), 40, turn=0.0, step=0.005)
+    positions[:6, 3:] = np.nan
+    truth = truth_of(positions)
+    still = am.tracking.without_common_motion(truth.detections)
+    for k in range(3):
+        steps = np.diff(still.points[truth.labels == k], axis=0)
+        assert np.linalg.norm(steps, axis=1).max() < 0.02
+
+
 def test_what_is_no_capture_is_told():
     with pytest.raises(ParameterError, match="detections"):
         am.tracking.without_common_motion(3)
@@ -265,6 +291,10 @@ def test_uncertain_bodies_are_tracked_without_it_if_that_is_more_certain():
     assert found.recipe.common_motion
     assert found.recipe.reason.startswith("without the motion that most markers have in common")
     assert "and this motion" in found.recipe.reason
+    tracked = am.tracking.carry_out(plan.recipe, truth.detections)
+    without = am.tracking.without_common_motion(truth.detections)
+    assert tracked.estimate.model == am.estimate_model(without).model
+    assert np.array_equal(tracked.tracks.labels, found.labels)
     assert am.evaluate(found, truth).idf1 > 0.99
     again = am.track(truth.detections, recipe=found.recipe)
     assert again.recipe == found.recipe

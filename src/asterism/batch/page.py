@@ -39,7 +39,7 @@ def write_page(
     timed : bool
         Whether the page states the running time, which differs from run to run.
     """
-    recipe = result.recipe
+    recipe, estimate = result.recipe, result.estimate or estimate
     stitched = ", then stitched" if recipe.stitch else ""
     options = ", ".join(f"{name}={value}" for name, value in flat(recipe.options).items())
     rows = [("method", recipe.method + stitched)]

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["Summary", "stitching_rows", "summarize"]
 
 
-REMOVED = "removed before the tracking: model and log posterior are those of the rest"
+REMOVED = "removed before the tracking: model and log posterior hold without it"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +42,7 @@ class Summary:
         Number of edits that the tracks respect.
     common_motion : bool
         Whether the motion that most markers have in common was removed before the tracking. The
-        model and the log posterior are those of the rest.
+        model and the log posterior hold without it.
     longest_gaps : tuple of am.model.Gap
         Longest gaps, at most three.
     gap_names : tuple of str or None
@@ -189,7 +189,7 @@ def summarize(
     """
     tracks, naming, filling = result.tracks.measured(), result.naming, result.filling
     recipe = result.recipe
-    # Without a common motion the model is that of the rest.
+    # Without a common motion the model holds for other coordinates.
     has_bonds = recipe.options.get("rigid") is not None and not recipe.common_motion
     d = tracks.detections
     assert isinstance(d, am.Capture)

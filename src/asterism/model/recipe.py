@@ -110,7 +110,7 @@ class Recipe:
         from the tracks of the pass before.
     common_motion : bool
         Whether the motion that most markers have in common is removed before (
-        `asterism.tracking.without_common_motion`). The model is then that of the rest.
+        `asterism.tracking.without_common_motion`). The model then holds without it.
 
     Examples
     --------

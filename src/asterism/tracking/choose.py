@@ -246,7 +246,7 @@ def without_motion_in_common(detections: Detections, model: TrackingModel | None
 def _gain_without(detections: Detections, model: TrackingModel) -> float:
     """Return the gain in log density per detection without the motion in common; 0 for none."""
     n_frames = detections.n_frames * MAX_COMPARED // max(detections.n_points, 1)
-    part = detections.part(0, max(min(n_frames, detections.n_frames), MIN_TOGETHER)).measured()
+    part = detections.part(0, min(max(n_frames, MIN_TOGETHER), detections.n_frames)).measured()
     still = without_common_motion(part)
     try:
         model_of_rest = estimate_model(still).model

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from asterism.tracking.attempts.uncorrected import Uncorrected
+    from asterism.tracking.estimation import ModelEstimate
     from asterism.tracking.filling import Filling
     from asterism.tracking.methods import Method
     from asterism.tracking.naming import Naming
@@ -46,6 +47,9 @@ class Tracked:
         Names with their probabilities; None without marker sets and own names.
     filling : Filling, optional
         Every gap; None if gaps are not filled.
+    estimate : ModelEstimate, optional
+        Estimate of the model, if it was estimated after the recipe was planned: without the motion
+        that most markers have in common.
 
     Examples
     --------
@@ -59,6 +63,7 @@ class Tracked:
     recipe: Recipe
     naming: Naming | None = None
     filling: Filling | None = None
+    estimate: ModelEstimate | None = None
 
     def __repr__(self) -> str:
         return f"Tracked({self.tracks!r})"
@@ -110,8 +115,8 @@ def track(
         ``tracks.recipe`` of an earlier call, which is repeated bit for bit. It replaces `method`,
         `model`, `stitch`, `seed` and `fill`; initial tracks, marker sets and edits are given again.
     progress : callable, optional
-        Called from time to time with the number of finished frames. Without a method, each of the
-        two that may run counts as half.
+        Called from time to time with the number of finished frames. Without a method, each further
+        attempt counts as half of what is left.
 
     Returns
     -------
@@ -260,7 +265,9 @@ def conclude(begun: Uncorrected, edits: Sequence[Edit] = ()) -> Tracked:
         decisions += of_filling(filling)
     carried = None if tracks.recipe is None else recipe
     tracks = dataclasses.replace(tracks, decisions=decisions, recipe=carried)
-    return Tracked(tracks=tracks, recipe=recipe, naming=naming, filling=filling)
+    return Tracked(
+        tracks=tracks, recipe=recipe, naming=naming, filling=filling, estimate=begun.estimate
+    )
 
 
 def _check_recipe(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -131,10 +132,10 @@ def plan_tracking(
                 detections, model, has_start=start is not None, is_estimated=estimate is not None
             )
     if choice is not None:
-        method = choice.method
         if stitch is True and not choice.stitch and start is None:
-            method = SMP(window=3)
-        stitch = choice.stitch if stitch == "auto" else stitch
+            reason = f"{choice.reason}; stitching is requested"
+            choice = replace(choice, method=SMP(window=3), stitch=True, reason=reason)
+        method, stitch = choice.method, choice.stitch if stitch == "auto" else stitch
         if choice.estimate is not None:
             estimate, model = choice.estimate, choice.estimate.model
     assert method is not None

@@ -201,8 +201,7 @@ def track(
     if prints:
         _print_capture(capture)
         if estimate is not None:
-            rest = ", without the motion in common" if recipe.common_motion else ""
-            print_table(estimate.reasons, ("parameter", "value", "why"), title=f"Model{rest}")
+            _print_model(estimate, recipe)
         if recipe.chosen:
             print_table([("method", recipe.chosen)])
     job = Run(
@@ -217,6 +216,8 @@ def track(
         with progress("writing the report"):
             write_page(result, report, estimate, summary)
     if prints:
+        if result.estimate is not None:
+            _print_model(result.estimate, result.recipe)
         if result.recipe.chosen != recipe.chosen:
             print_table([("method", result.recipe.chosen)])
         rows = summary.rows()
@@ -225,6 +226,11 @@ def track(
     if json:
         page = {} if report is None else {"report": str(report)}
         print_json(summary.to_dict() | _settings_of(result.recipe) | page)
+
+
+def _print_model(estimate: am.tracking.ModelEstimate, recipe: am.model.Recipe) -> None:
+    rest = ", without the motion in common" if recipe.common_motion else ""
+    print_table(estimate.reasons, ("parameter", "value", "why"), title=f"\nModel{rest}")
 
 
 def _check_start(method: str | None, capture: am.Capture, source: Path) -> None:

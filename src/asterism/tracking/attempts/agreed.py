@@ -6,7 +6,6 @@ import dataclasses
 from typing import TYPE_CHECKING, Any
 
 from asterism.tracking.attempts.attempt import attempt
-from asterism.tracking.attempts.halves import Halves
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -17,10 +16,12 @@ if TYPE_CHECKING:
 
 __all__ = ["until_agreed"]
 
-NEAR = 1.0
-"""Largest difference between the log posteriors of two searches that agree, nats."""
-MORE, MAX_MOVES = 4, 1600
-"""Factor by which the moves grow if they do not, and the largest number of moves."""
+AGREEMENT = 1e-3
+"""Largest difference between the log posteriors of two searches that agree, nats per detection. It
+is at least 1 nat for the capture."""
+SEARCHES = 2
+GROWTH = (1, 4, 16)
+"""Moves of a search in those of the recipe, from one pair of searches to the next."""
 
 
 def until_agreed(
@@ -33,34 +34,41 @@ def until_agreed(
 ) -> Uncorrected:
     """Search twice with independent chains, with ever more moves until both agree.
 
-    The most probable of all results is returned, with the recipe of its search alone and in it as
-    reason how far the last two agree.
+    The most probable of all results is returned. Its recipe repeats that one search, and its reason
+    states whether the last two searches agreed.
 
     Parameters
     ----------
     recipe, detections, method, start, progress
         As for `asterism.tracking.carry_out`; the method is `MCMCDA`.
     """
-    parts = Halves(detections.n_frames, progress)
-    moves, seed, best = recipe.options["moves"], recipe.seed or 0, None
-    while True:
+    del method  # its options are in the recipe
+    n, done, whole = detections.n_frames, 0, SEARCHES * sum(GROWTH)
+    best, moves, apart, is_agreed = None, 0.0, 0.0, False
+
+    def advance(frames: int) -> None:
+        if progress is not None:
+            progress((done * n + growth * frames) // whole)
+
+    for growth in GROWTH:
+        moves = growth * recipe.options["moves"]
         once = dataclasses.replace(recipe, retry=False, options={**recipe.options, "moves": moves})
-        pair = [
-            attempt(
-                dataclasses.replace(once, seed=seed + k), detections, start=start,
-                progress=parts.next(),
-            )
-            for k in range(2)
-        ]  # fmt: skip
-        best = max([best, *pair] if best else pair, key=_log_posterior)
+        pair = []
+        for k in range(SEARCHES):
+            searched = dataclasses.replace(once, seed=(recipe.seed or 0) + k)
+            pair.append(attempt(searched, detections, start=start, progress=advance))
+            done += growth
+        best = max([*pair] if best is None else [best, *pair], key=_log_posterior)
         apart = abs(_log_posterior(pair[0]) - _log_posterior(pair[1]))
-        if apart <= NEAR or moves >= MAX_MOVES:
+        is_agreed = apart <= max(1.0, AGREEMENT * detections.n_points)
+        if is_agreed:
             break
-        moves *= MORE
-    how = "agree within 1 nat" if apart <= NEAR else f"still differ by {apart:.1f} nats"
-    reason = f"{recipe.reason}; two searches with {moves:g} moves {how}"
+    if progress is not None:
+        progress(n)
+    assert best is not None
+    how = "agree within" if is_agreed else "still differ by"
+    reason = f"{recipe.reason}; two searches with {moves:g} moves {how} {apart:.1f} nats"
     found = dataclasses.replace(best.recipe, reason=reason)
-    parts.end()
     tracks = dataclasses.replace(best.tracks, recipe=found)
     return dataclasses.replace(best, tracks=tracks, recipe=found)
 

@@ -36,6 +36,6 @@ class Halves:
         return advance
 
     def end(self) -> None:
-        """Tell that there is no further attempt."""
+        """Report all frames as finished."""
         if self._progress is not None:
             self._progress(self._n)

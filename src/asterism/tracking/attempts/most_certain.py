@@ -51,8 +51,10 @@ def carried_out(
     recipe, detections, method, start, progress
         As for `asterism.tracking.carry_out`.
     """
-    again = most_certain if recipe.stitch else until_agreed
-    make = again if recipe.retry else attempt
+    make = attempt
+    if recipe.retry:
+        is_search = recipe.method == MCMCDA.name and not recipe.stitch
+        make = until_agreed if is_search else most_certain
     if not recipe.common_motion:
         return make(recipe, detections, method, start=start, progress=progress)
     still = without_common_motion(detections)
@@ -151,7 +153,10 @@ def _by_bonds(
 def _without_motion_in_common(
     recipe: Recipe, detections: Detections, progress: Callable[[int], Any]
 ) -> Uncorrected | None:
-    """Track without the motion that most markers have in common; None if it explains too little."""
+    """Track without the motion that most markers have in common.
+
+    None if this motion explains too little, or if there are no bodies without it.
+    """
     choice = without_motion_in_common(detections, recipe.model)
     # Bodies are still bodies then, and confidence from their distances is comparable.
     if choice is None or choice.estimate is None or not choice.stitch:
@@ -162,7 +167,7 @@ def _without_motion_in_common(
     )  # fmt: skip
     found = carried_out(other, detections, progress=progress)
     recipe = dataclasses.replace(found.recipe, reason=choice.reason)
-    return dataclasses.replace(found, recipe=recipe)
+    return dataclasses.replace(found, recipe=recipe, estimate=choice.estimate)
 
 
 def _more_certain(before: Uncorrected, other: Uncorrected, margin: float) -> Uncorrected:

@@ -16,6 +16,7 @@ from asterism.tracking.confidence.identity import (
 
 if TYPE_CHECKING:
     from asterism.model import Detections, Recipe, TrackingModel, Tracks
+    from asterism.tracking.estimation import ModelEstimate
     from asterism.tracking.naming import Naming
     from asterism.tracking.stitching import Stitching
 
@@ -42,6 +43,8 @@ class Uncorrected:
         Stitching that made them.
     naming : Naming, optional
         Names with their probabilities.
+    estimate : ModelEstimate, optional
+        Estimate of the model, if it was estimated in a further attempt.
     still : Detections, optional
         The same detections without the motion that most markers have in common, if the model and
         the stitching hold for these coordinates.
@@ -52,6 +55,7 @@ class Uncorrected:
     model: TrackingModel
     stitching: Stitching | None = None
     naming: Naming | None = None
+    estimate: ModelEstimate | None = None
     still: Detections | None = None
 
     def as_modelled(self, tracks: Tracks) -> Tracks:

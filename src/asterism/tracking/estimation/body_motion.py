@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 __all__ = ["OVER_THREE_FRAMES", "fit_body_motion"]
 
+MIN_LENGTH = 3
+"""Number of detections of a track that has a motion."""
 OVER_THREE_FRAMES = SMP(window=3, rigid=Rigidity())
 """Method by whose tracks the motion is fitted by default."""
 
@@ -49,7 +51,7 @@ def fit_body_motion(
     tracks : Tracks
         Tracks to which it was fitted.
 
-    If the markers move in random walks, the result is None.
+    If the markers move in random walks, or no track has three detections, the result is None.
 
     Examples
     --------
@@ -68,6 +70,8 @@ def fit_body_motion(
     levels = (*start.levels[:-1], WIDER * start.levels[-1])
     wide = with_fit(model, replace(start, noise=MIN_NOISE, levels=levels), n_axes)
     rough = associate(method, detections, wide, score=False)
+    if rough.lengths.max(initial=0) < MIN_LENGTH:
+        return None
     fit = fit_motion(rough, model, start, BOUNDS, refine=True)
     tracks = associate(method, detections, with_fit(model, fit, n_axes), score=False)
     return with_fit(model, fit_motion(tracks, model, fit, BOUNDS, refine=True), n_axes), tracks

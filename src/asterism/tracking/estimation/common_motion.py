@@ -1,8 +1,8 @@
-"""The rigid motion that all markers of a capture have in common, and the capture without it.
+"""The rigid motion that most markers of a capture have in common, and the capture without it.
 
 Markers on a hand or a face keep no stable distances, and may still move mostly together. Without
-the motion in common, a marker moves little between two frames, and the motion model knows better
-where.
+the motion in common, a marker moves little between two frames, and the motion model predicts it
+better.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ MAX_UNSEEN = 5
 MAX_SHIFTED = 60
 """Largest number of detections of a frame whose pairs are searched for everywhere."""
 N_SHIFTED = 8
-"""About the number of these detections, one of which is at its known point after the shift."""
+"""About the number of detections of a frame that are each tried on every known point."""
 DOUBTFUL, LOST = 0.5, 0.2
 """Agreement of a fit, 0 to 1, below which another one is searched for, and below which there is no
 fit: the share of the detections that are paired, less for each the squared distance of the pair
@@ -97,7 +97,7 @@ def without_common_motion(detections: Detections) -> Detections:
     turn, at = np.eye(D), np.median(d.points[: d.counts[d.counts > 0][0]], axis=0)
     last_turn, velocity = np.eye(D), np.zeros(D)
     known = np.empty((0, D))
-    unseen = np.empty(0, dtype=np.int64)
+    unseen, is_begun = np.empty(0, dtype=np.int64), False
     for t in range(d.n_frames):
         own = slice(d.offsets[t], d.offsets[t + 1])
         y, before = d.points[own], (turn, at)
@@ -112,8 +112,9 @@ def without_common_motion(detections: Detections) -> Detections:
         elif len(y) < MIN_PAIRS:  # too few for a fit: the motion goes on while points are known
             is_new[:] = False
         else:  # lost: the points of this frame are the known ones
-            turn, at = before[0], np.median(y, axis=0)
-            last_turn, velocity = np.eye(D), velocity / 2
+            turn = before[0]
+            at = np.median(y, axis=0) if is_begun else at
+            last_turn, velocity, is_begun = np.eye(D), velocity / 2, True
             known, unseen = known[:0], unseen[:0]
         z = points[own] = (y - at) @ turn
         unseen = unseen + 1
