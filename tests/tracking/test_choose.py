@@ -234,6 +234,7 @@ class Planned(Uncorrected):
     @property
     def expected_right(self):
         way = "bonds" if self.recipe.options.get("rigid") else self.recipe.method
+        way = "still" if self.recipe.common_motion else way
         return self.shares[way] * len(self.tracks.labels)
 
 
@@ -572,3 +573,33 @@ def test_a_crowded_capture_is_searched_by_mcmcda_which_needs_a_margin(
     best = most_certain(recipe, walk.detections)
     assert made == expected
     assert best.recipe.method == kept
+
+
+@pytest.mark.parametrize(
+    ("gain", "has_bodies", "is_kept"),
+    [(0.001, True, False), (0.003, True, True), (0.003, False, False)],
+)
+def test_the_motion_in_common_is_removed_from_bodies_that_are_more_certain_without_it(
+    gain, has_bodies, is_kept, monkeypatch
+):
+    walk = am.simulate.person(activity="walk", frames=60, seed=1)
+    recipe = am.tracking.plan_tracking(walk.detections).recipe
+    shares = {"smp": 0.7, "tomht": 0.8, "bonds": 0.7, "still": 0.8 + gain}
+    monkeypatch.setattr(Planned, "shares", shares)
+    choice = am.tracking.choose_method(walk.detections, recipe.model)
+    estimate = am.estimate_model(walk.detections)
+    choice = dataclasses.replace(choice, estimate=estimate, stitch=has_bodies, reason="without it")
+
+    def planned(recipe, *_, **__):
+        return Planned(tracks=walk, recipe=recipe, model=recipe.model)
+
+    monkeypatch.setattr(f"{MOST_CERTAIN}.attempt", planned)
+    monkeypatch.setattr(f"{MOST_CERTAIN}.refined_by_own_distances", lambda found: found)
+    monkeypatch.setattr(f"{MOST_CERTAIN}.assigned_again", lambda found: found)
+    monkeypatch.setattr(f"{MOST_CERTAIN}.has_many_rivals", lambda *_: False)
+    monkeypatch.setattr(f"{MOST_CERTAIN}.without_motion_in_common", lambda *_: choice)
+    best = most_certain(recipe, walk.detections)
+    assert best.recipe.common_motion == is_kept
+    assert best.recipe.reason.startswith("without it; 80.3 %") == is_kept
+    assert (best.estimate is estimate) == is_kept
+    assert (best.still is not None) == is_kept
