@@ -20,9 +20,9 @@ def crowded(seed=1):
     return am.simulate.corrupt(take, missing=0.1, clutter=0.1, seed=seed)
 
 
-def scripted(monkeypatch, log_posteriors):
+def scripted(monkeypatch, log_posteriors, n_frames=20):
     """Replace attempts by results with these log posteriors; return the recipes they get."""
-    take, made = am.simulate.cube(frames=20, seed=1), []
+    take, made = am.simulate.cube(frames=n_frames, seed=1), []
     values = iter(log_posteriors)
 
     def attempt(recipe, *_, **__):
@@ -56,6 +56,12 @@ def test_moves_grow_until_two_searches_agree(log_posteriors, moves, best, how, m
     assert recipe.reason.startswith("many rivals; two searches")
     assert recipe.reason.endswith(how)
     assert not recipe.retry
+
+
+def test_searches_of_more_detections_may_differ_by_more(monkeypatch):
+    found, made = scripted(monkeypatch, [10.0, 13.0], n_frames=400)
+    assert len(made) == 2
+    assert found.recipe.reason.endswith("agree within 3.0 nats")
 
 
 def test_a_crowded_capture_is_searched_until_searches_agree_and_its_recipe_repeats_it():

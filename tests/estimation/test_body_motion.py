@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 
+import numpy as np
 import pytest
 
 import asterism as am
@@ -44,3 +45,10 @@ def test_the_noise_of_tracks_is_found_from_a_model_that_has_more():
     sensor = dataclasses.replace(model.sensor, noise_sigma=4 * model.sensor.noise_sigma)
     fitted = fit_to_tracks(truth, dataclasses.replace(model, sensor=sensor))
     assert abs(fitted.sensor.noise_sigma - 5e-4) < 5e-5
+
+
+def test_tracks_without_a_motion_give_none():
+    model = am.estimate_model(am.simulate.person(frames=60, seed=1).detections).model
+    rng = np.random.default_rng(1)
+    d = am.Detections.from_frames([0.0, 0.01], list(rng.uniform(-100, 100, (2, 5, 3))))
+    assert fit_body_motion(d, model) is None

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
 
 import asterism as am
+from asterism.cli import main
 from asterism.edit.session import Session
 from asterism.errors import ParameterError
 from asterism.tracking.choose import without_motion_in_common
 from asterism.tracking.estimation.common_motion import MIN_PAIRS
+from tests.reporting.cases import text_of
 
 
 def moved(shape, n_frames, *, seed=1, step=0.02, turn=0.05):
@@ -304,6 +307,20 @@ def test_uncertain_bodies_are_tracked_without_it_if_that_is_more_certain():
         patch.setattr(name, lambda *_: None)
         with_it = am.track(truth.detections)
     assert am.evaluate(found, truth).idf1 > am.evaluate(with_it, truth).idf1
+
+
+def test_page_and_terminal_state_the_model_of_a_late_choice(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    d = hand(2).detections
+    am.write(d, "hand.csv")
+    assert main(["track", "hand.csv", "-o", "out.csv", "--report", "page.html"]) == 0
+    printed = capsys.readouterr().out
+    models = [each.split("\n\n")[0] for each in printed.split("\nModel")[1:]]
+    assert models[1].startswith(", without the motion in common")
+    noise = re.search(r"noise σ +(\S+) ±", models[1])[1]
+    assert f"noise σ {noise}" not in models[0]
+    page = re.sub(r"\s+", " ", text_of((tmp_path / "page.html").read_bytes()))
+    assert f"without the motion that most markers have in common (noise σ {noise} " in page
 
 
 def test_a_motion_that_explains_less_than_it_costs_stays(monkeypatch):
