@@ -217,7 +217,7 @@ def track(
             write_page(result, report, estimate, summary)
     if prints:
         if result.estimate is not None:
-            _print_model(result.estimate, result.recipe)
+            _print_model(result.estimate, result.recipe, above="\n")
         if result.recipe.chosen != recipe.chosen:
             print_table([("method", result.recipe.chosen)])
         rows = summary.rows()
@@ -228,9 +228,11 @@ def track(
         print_json(summary.to_dict() | _settings_of(result.recipe) | page)
 
 
-def _print_model(estimate: am.tracking.ModelEstimate, recipe: am.model.Recipe) -> None:
+def _print_model(
+    estimate: am.tracking.ModelEstimate, recipe: am.model.Recipe, above: str = ""
+) -> None:
     rest = ", without the motion in common" if recipe.common_motion else ""
-    print_table(estimate.reasons, ("parameter", "value", "why"), title=f"\nModel{rest}")
+    print_table(estimate.reasons, ("parameter", "value", "why"), title=f"{above}Model{rest}")
 
 
 def _check_start(method: str | None, capture: am.Capture, source: Path) -> None:
