@@ -20,7 +20,7 @@ from unittest import mock
 import numpy as np
 
 import asterism as am
-from asterism.tracking import choose
+from asterism.tracking import plan
 from asterism.tracking.attempts import most_certain
 from report import conditions, publish, table
 
@@ -70,7 +70,7 @@ def hand(size: float, seed: int) -> am.Tracks:
 def with_it(d: am.Detections) -> am.Tracks:
     """Track with the motion in common."""
     with (
-        mock.patch.object(choose, "without_motion_in_common", return_value=None),
+        mock.patch.object(plan, "without_motion_in_common", return_value=None),
         mock.patch.object(most_certain, "without_motion_in_common", return_value=None),
     ):
         return am.track(d)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import asterism as am
-from asterism.tracking.attempts import agreed
+from asterism.tracking.attempts import agreed, most_certain
 from asterism.tracking.attempts.halves import Halves
 from asterism.tracking.attempts.uncorrected import Uncorrected
 from asterism.tracking.choose import CONFUSED
@@ -81,13 +81,24 @@ def test_a_crowded_capture_is_searched_until_searches_agree_and_its_recipe_repea
     np.testing.assert_array_equal(again.confidence, found.confidence)
 
 
-def test_few_rivals_need_one_search():
+def test_few_rivals_need_one_search(monkeypatch):
     truth = am.simulate.smooth(n_markers=200, frames=50, seed=1)
     d = am.simulate.corrupt(truth, missing=0.1, clutter=0.1, noise=0.005, seed=1).detections
     plan = am.tracking.plan_tracking(d)
     choice = am.tracking.choose_method(d, plan.recipe.model)
     assert 0 < choice.rivals < CONFUSED
     assert (plan.recipe.method, plan.recipe.retry) == ("mcmcda", False)
+    made = []
+    kept = most_certain.attempt
+    monkeypatch.setattr(
+        most_certain,
+        "attempt",
+        lambda recipe, *a, **k: made.append(recipe) or kept(recipe, *a, **k),
+    )
+    monkeypatch.setattr(agreed, "attempt", None)
+    tracks = am.track(d)
+    assert made == [plan.recipe]
+    assert tracks.recipe == dataclasses.replace(plan.recipe, passes=1)
 
 
 def test_progress_grows_over_attempts_and_ends_with_the_last_frame():

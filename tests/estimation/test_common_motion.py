@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 
 import numpy as np
@@ -12,8 +11,8 @@ import asterism as am
 from asterism.cli import main
 from asterism.edit.session import Session
 from asterism.errors import ParameterError
-from asterism.tracking.choose import without_motion_in_common
 from asterism.tracking.estimation.common_motion import MIN_PAIRS
+from asterism.tracking.motion_in_common import without_motion_in_common
 from tests.reporting.cases import text_of
 
 
@@ -215,7 +214,7 @@ def test_markers_on_skin_are_tracked_without_the_motion_in_common():
     d = truth.detections
     found = am.track(d)
     assert found.recipe.common_motion
-    assert "more probable" in found.recipe.reason
+    assert "raises the log density" in found.recipe.reason
     assert found.detections is d
     model = am.estimate_model(d).model
     as_it_is = am.track(d, model=model)  # a given model holds for the capture as it is
@@ -290,14 +289,13 @@ def test_uncertain_bodies_are_tracked_without_it_if_that_is_more_certain():
     plan = am.tracking.plan_tracking(truth.detections)
     assert plan.recipe.stitch
     assert not plan.recipe.common_motion  # it has bodies
-    found = am.track(truth.detections)
+    tracked = am.tracking.carry_out(plan.recipe, truth.detections)
+    found = tracked.tracks
     assert found.recipe.common_motion
     assert found.recipe.reason.startswith("without the motion that most markers have in common")
-    assert "and this motion" in found.recipe.reason
-    tracked = am.tracking.carry_out(plan.recipe, truth.detections)
+    assert "with this motion, by" in found.recipe.reason
     without = am.tracking.without_common_motion(truth.detections)
     assert tracked.estimate.model == am.estimate_model(without).model
-    assert np.array_equal(tracked.tracks.labels, found.labels)
     assert am.evaluate(found, truth).idf1 > 0.99
     again = am.track(truth.detections, recipe=found.recipe)
     assert again.recipe == found.recipe
@@ -328,25 +326,22 @@ def test_a_motion_that_explains_less_than_it_costs_stays(monkeypatch):
     d = am.simulate.corrupt(take, noise=3e-3, seed=1).detections
     model = am.estimate_model(d).model
     assert without_motion_in_common(d, model) is None
-    monkeypatch.setattr("asterism.tracking.choose.COST", 0.0)
+    monkeypatch.setattr("asterism.tracking.motion_in_common.COST", 0.0)
     assert without_motion_in_common(d, model) is not None
 
 
 def test_independent_markers_and_people_are_tracked_as_they_are(monkeypatch):
     monkeypatch.setattr("asterism.tracking.choose.CONFUSED", 0.0)
+    monkeypatch.setattr("asterism.tracking.plan.CONFUSED", -1.0)
     person = am.simulate.person(frames=120, seed=1)
     for take in (am.simulate.swarm(frames=150, seed=1), am.simulate.smooth(seed=1), person):
         d = am.simulate.corrupt(take, missing=0.1, clutter=0.1, noise=1e-3, seed=1).detections
-        choice = am.tracking.choose_method(d, am.estimate_model(d).model)
-        assert choice.estimate is None
+        assert not am.tracking.plan_tracking(d).recipe.common_motion
 
 
 def test_a_choice_without_it_is_not_offered_for_a_given_model():
     truth = skin()
     model = am.estimate_model(truth.detections).model
-    found = [
-        am.tracking.choose_method(truth.detections, model, is_estimated=each)
-        for each in (True, False)
-    ]
-    assert found[0].estimate is not None
-    assert found[1] == dataclasses.replace(found[1], estimate=None)
+    plans = [am.tracking.plan_tracking(truth.detections, model=each) for each in (None, model)]
+    assert [each.recipe.common_motion for each in plans] == [True, False]
+    assert plans[1].recipe.model == model

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import dataclasses
+import itertools
 import json
 import subprocess
 import sys
@@ -215,7 +216,8 @@ def test_the_command():
     ]  # fmt: skip
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
-    said = json.loads("".join(iter(process.stdout.readline, "}\n")) + "}")
+    first = itertools.takewhile(lambda line: line != "}\n", process.stdout)
+    said = json.loads("".join(first) + "}")
     assert said["rig"].startswith("6 cameras")
     source = parse_source(f"qtm://127.0.0.1:{port}?2d")
     source.open()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
 import signal
 import socket
@@ -140,7 +141,8 @@ def test_the_command(tmp_path, protocol):
     ]  # fmt: skip
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout is not None
-    said = json.loads("".join(iter(process.stdout.readline, "}\n")) + "}")
+    first = itertools.takewhile(lambda line: line != "}\n", process.stdout)
+    said = json.loads("".join(first) + "}")
     assert said["address"] == f"127.0.0.1:{port}"
     assert said["corruption"] == {"missing": 0.1, "clutter": 0.1, "seed": 0, "keep_unnamed": True}
     known = am.io.read_tracks(truth)

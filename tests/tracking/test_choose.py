@@ -15,7 +15,7 @@ import pytest
 import asterism as am
 from asterism.cli import main
 from asterism.simulate import Burst
-from asterism.tracking.attempts.most_certain import attempt, most_certain
+from asterism.tracking.attempts.most_certain import attempt, carried_out, most_certain
 from asterism.tracking.attempts.own_distances import (
     _reassigned,
     assigned_again,
@@ -24,6 +24,7 @@ from asterism.tracking.attempts.own_distances import (
 )
 from asterism.tracking.attempts.uncorrected import Uncorrected
 from asterism.tracking.choose import ON_BODIES, partners
+from asterism.tracking.methods import options_of
 from asterism.tracking.stitching.exchanged import with_markers
 from tests.scenes import exchanged, steady_and_loose
 
@@ -544,22 +545,10 @@ def test_json_holds_the_choice_and_auto_may_be_named(person, capsys):
     assert (report["method"], report["stitch"]) == ("gnn", False)
 
 
-@pytest.mark.parametrize(
-    ("has_many_rivals", "shares", "expected", "kept"),
-    [
-        (False, {}, ["smp", "bonds", "tomht"], "tomht"),
-        (True, {}, ["smp", "bonds", "tomht", "mcmcda"], "tomht"),
-        (True, {"mcmcda": 0.803}, ["smp", "bonds", "tomht", "mcmcda"], "mcmcda"),
-    ],
-)
-def test_a_crowded_capture_is_searched_by_mcmcda_which_needs_a_margin(
-    has_many_rivals, shares, expected, kept, monkeypatch
-):
-    walk = am.simulate.person(activity="walk", frames=60, seed=1)
-    recipe = am.tracking.plan_tracking(walk.detections).recipe
-    shares = {"smp": 0.7, "tomht": 0.8, "bonds": 0.7, "mcmcda": 0.801} | shares
-    monkeypatch.setattr(Planned, "shares", shares)
-    made = []
+@pytest.fixture
+def walk_planned(monkeypatch):
+    """A walk, its recipe, and the ways of the attempts at it, which make `Planned` tracks."""
+    walk, made = am.simulate.person(activity="walk", frames=60, seed=1), []
 
     def planned(recipe, *_, **__):
         made.append("bonds" if recipe.options.get("rigid") else recipe.method)
@@ -568,10 +557,25 @@ def test_a_crowded_capture_is_searched_by_mcmcda_which_needs_a_margin(
     monkeypatch.setattr(f"{MOST_CERTAIN}.attempt", planned)
     monkeypatch.setattr(f"{MOST_CERTAIN}.refined_by_own_distances", lambda found: found)
     monkeypatch.setattr(f"{MOST_CERTAIN}.assigned_again", lambda found: found)
-    monkeypatch.setattr(f"{MOST_CERTAIN}.has_many_rivals", lambda *_: has_many_rivals)
+    monkeypatch.setattr(f"{MOST_CERTAIN}.has_many_rivals", lambda *_: False)
     monkeypatch.setattr(f"{MOST_CERTAIN}.without_motion_in_common", lambda *_: None)
+    shares = {"smp": 0.7, "tomht": 0.8, "bonds": 0.7, "gnn": 0.1}
+    monkeypatch.setattr(Planned, "shares", shares)
+    return walk, am.tracking.plan_tracking(walk.detections).recipe, made
+
+
+@pytest.mark.parametrize(
+    ("has_many_rivals", "share", "kept"),
+    [(False, 0.9, "tomht"), (True, 0.801, "tomht"), (True, 0.803, "mcmcda")],
+)
+def test_a_crowded_capture_is_searched_by_mcmcda_which_needs_a_margin(
+    has_many_rivals, share, kept, walk_planned, monkeypatch
+):
+    walk, recipe, made = walk_planned
+    monkeypatch.setitem(Planned.shares, "mcmcda", share)
+    monkeypatch.setattr(f"{MOST_CERTAIN}.has_many_rivals", lambda *_: has_many_rivals)
     best = most_certain(recipe, walk.detections)
-    assert made == expected
+    assert made == ["smp", "bonds", "tomht", "mcmcda"][: 4 if has_many_rivals else 3]
     assert best.recipe.method == kept
 
 
@@ -580,26 +584,44 @@ def test_a_crowded_capture_is_searched_by_mcmcda_which_needs_a_margin(
     [(0.001, True, False), (0.003, True, True), (0.003, False, False)],
 )
 def test_the_motion_in_common_is_removed_from_bodies_that_are_more_certain_without_it(
-    gain, has_bodies, is_kept, monkeypatch
+    gain, has_bodies, is_kept, walk_planned, monkeypatch
 ):
-    walk = am.simulate.person(activity="walk", frames=60, seed=1)
-    recipe = am.tracking.plan_tracking(walk.detections).recipe
-    shares = {"smp": 0.7, "tomht": 0.8, "bonds": 0.7, "still": 0.8 + gain}
-    monkeypatch.setattr(Planned, "shares", shares)
+    walk, recipe, _ = walk_planned
+    monkeypatch.setitem(Planned.shares, "still", 0.8 + gain)
     choice = am.tracking.choose_method(walk.detections, recipe.model)
-    estimate = am.estimate_model(walk.detections)
-    choice = dataclasses.replace(choice, estimate=estimate, stitch=has_bodies, reason="without it")
-
-    def planned(recipe, *_, **__):
-        return Planned(tracks=walk, recipe=recipe, model=recipe.model)
-
-    monkeypatch.setattr(f"{MOST_CERTAIN}.attempt", planned)
-    monkeypatch.setattr(f"{MOST_CERTAIN}.refined_by_own_distances", lambda found: found)
-    monkeypatch.setattr(f"{MOST_CERTAIN}.assigned_again", lambda found: found)
-    monkeypatch.setattr(f"{MOST_CERTAIN}.has_many_rivals", lambda *_: False)
+    noisy = am.simulate.corrupt(walk, noise=2e-3, seed=1)
+    estimate = am.estimate_model(noisy.detections)
+    choice = dataclasses.replace(
+        choice, estimate=estimate, common_motion=True, stitch=has_bodies, reason="without it"
+    )
     monkeypatch.setattr(f"{MOST_CERTAIN}.without_motion_in_common", lambda *_: choice)
     best = most_certain(recipe, walk.detections)
     assert best.recipe.common_motion == is_kept
     assert best.recipe.reason.startswith("without it; 80.3 %") == is_kept
-    assert (best.estimate is estimate) == is_kept
+    assert (best.estimate is estimate) == (best.recipe.model == estimate.model) == is_kept
     assert (best.still is not None) == is_kept
+
+
+@pytest.mark.parametrize("method", [am.GNN(), am.MCMCDA(moves=400)])
+def test_a_recipe_of_a_further_attempt_is_attempted_once(method, walk_planned, monkeypatch):
+    walk, recipe, made = walk_planned
+    monkeypatch.setattr(f"{MOST_CERTAIN}.has_many_rivals", lambda *_: True)
+    monkeypatch.setitem(Planned.shares, "mcmcda", 0.1)
+    assert recipe.retry
+    kept = dataclasses.replace(recipe, method=method.name, options=options_of(method))
+    assert carried_out(kept, walk.detections).recipe.method == method.name
+    assert made == [method.name]
+
+
+def test_a_recipe_repeats_a_search_of_bodies(monkeypatch):
+    walk = am.simulate.person(activity="walk", frames=240, seed=11)
+    truth = am.simulate.corrupt(walk, missing=0.1, clutter=0.1, noise=3e-4, stride=4, seed=11)
+    monkeypatch.setattr(f"{MOST_CERTAIN}.has_many_rivals", lambda *_: True)
+    monkeypatch.setattr(f"{MOST_CERTAIN}._more_certain", lambda before, other, margin: other)
+    monkeypatch.setattr(DOUBTFUL, -1.0)
+    found = am.track(truth.detections)
+    assert (found.recipe.method, found.recipe.stitch) == ("mcmcda", True)
+    again = am.track(truth.detections, recipe=found.recipe)
+    assert again.recipe == found.recipe
+    np.testing.assert_array_equal(again.labels, found.labels)
+    np.testing.assert_array_equal(again.identity_confidence, found.identity_confidence)

@@ -7,18 +7,15 @@ the association was ambiguous. The documentation (`Which method when`) measures 
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from asterism.checks import check_kind
-from asterism.errors import ParameterError
 from asterism.model import Detections, RandomWalk, TrackingModel, Tracks
-from asterism.model.posterior import track_scores
 from asterism.records import record
-from asterism.tracking.estimation import estimate_model, fit_body_motion, without_common_motion
+from asterism.tracking.estimation import fit_body_motion
 from asterism.tracking.methods.gnn import GNN
 from asterism.tracking.methods.mcmcda import MCMCDA
 from asterism.tracking.methods.options import Rigidity
@@ -37,7 +34,7 @@ __all__ = [
     "Choice",
     "choose_method",
     "has_many_rivals",
-    "without_motion_in_common",
+    "quick_tracks",
 ]
 
 AUTO = "auto"
@@ -64,11 +61,6 @@ CONFUSED = 1.0
 """Number of rival detections per link above which the tracks of GNN do not tell whether there are
 bodies, so that `fit_body_motion` does, `MCMCDA` searches longer, and markers without bodies are
 tried without the motion in common."""
-COST = 0.5
-"""Cost of a coordinate or an angle of a motion in common, in the logarithm of the number of
-detections of a frame (BIC), nats."""
-MAX_COMPARED = 20_000
-"""Number of detections at the beginning of a capture that show whether there is one."""
 
 
 @record
@@ -86,8 +78,9 @@ class Choice:
     rivals : float
         Number of rival detections per link.
     estimate : ModelEstimate, optional
-        Model of the capture without the motion that its markers have in common, if it is to be
-        tracked without (`without_common_motion`).
+        Model for which this holds, if it was estimated with the choice.
+    common_motion : bool
+        Whether the motion that most markers have in common is removed (`without_common_motion`).
 
     Examples
     --------
@@ -105,14 +98,11 @@ class Choice:
     reason: str
     rivals: float = 0.0
     estimate: ModelEstimate | None = None
+    common_motion: bool = False
 
 
 def choose_method(
-    detections: Detections,
-    model: TrackingModel,
-    *,
-    has_start: bool = False,
-    is_estimated: bool = True,
+    detections: Detections, model: TrackingModel, *, has_start: bool = False
 ) -> Choice:
     """Select a method from measured properties of a capture.
 
@@ -123,11 +113,6 @@ def choose_method(
     - Markers that move by a random walk, or that enter each other's gates: `MCMCDA`.
     - Any other capture is unambiguous: `GNN`.
 
-    Where there are no bodies and every link has a rival, the same is measured without the motion
-    that most markers have in common. The capture is tracked so if the detections are more probable
-    by more than this motion costs: half the logarithm of the number of detections of a frame for
-    each of its coordinates and angles (BIC).
-
     Parameters
     ----------
     detections : Detections
@@ -136,8 +121,6 @@ def choose_method(
         Tracking model of the capture, with which GNN tracks it once.
     has_start : bool
         Whether the tracking starts from given tracks; then nothing is measured.
-    is_estimated : bool
-        Whether the model is estimated. A given one holds for the capture as it is.
 
     Returns
     -------
@@ -163,15 +146,11 @@ def choose_method(
     if has_start:
         return Choice(method=MCMCDA(), stitch=False, reason="initial tracks are given")
     detections = detections.measured()
-    tracks, rivals = _quick_tracks(detections, model)
-    choice = replace(_as_it_is(tracks, model, rivals), rivals=rivals)
-    # Bodies that move apart would be lost in the coordinates of one of them: see `most_certain`.
-    if is_estimated and rivals > CONFUSED and not choice.stitch:
-        return without_motion_in_common(detections, model) or choice
-    return choice
+    tracks, rivals = quick_tracks(detections, model)
+    return replace(_choice(tracks, model, rivals), rivals=rivals)
 
 
-def _as_it_is(tracks: Tracks, model: TrackingModel, rivals: float) -> Choice:
+def _choice(tracks: Tracks, model: TrackingModel, rivals: float) -> Choice:
     """Return the choice for tracks of GNN with this number of rival detections per link."""
     if bodies := _bodies(tracks, model):
         return bodies
@@ -190,11 +169,18 @@ def _as_it_is(tracks: Tracks, model: TrackingModel, rivals: float) -> Choice:
     return Choice(method=GNN(), stitch=False, reason=rate)
 
 
-def _quick_tracks(detections: Detections, model: TrackingModel) -> tuple[Tracks, float]:
+def quick_tracks(detections: Detections, model: TrackingModel) -> tuple[Tracks, float]:
     """Return tracks of GNN, and the number of rival detections per link.
 
     The number is per link, not per detection: the first detection of a track is in no gate, and
     short captures consist largely of first detections.
+
+    Parameters
+    ----------
+    detections : Detections
+        Capture.
+    model : TrackingModel
+        Its model.
     """
     method = GNN()
     state, labels, _ = method.run(method.init(model, n_axes=detections.n_axes), detections)
@@ -214,56 +200,7 @@ def has_many_rivals(detections: Detections, model: TrackingModel) -> bool:
     model : TrackingModel
         Its model.
     """
-    return _quick_tracks(detections.measured(), model)[1] > CONFUSED
-
-
-def without_motion_in_common(detections: Detections, model: TrackingModel | None) -> Choice | None:
-    """Return the choice without the motion in common, None if that explains too little.
-
-    Parameters
-    ----------
-    detections : Detections
-        Capture.
-    model : TrackingModel or None
-        Its model; None if none can be estimated, so that nothing is left to compare with.
-    """
-    if model is None:
-        why = "as no marker is nearer to its next position than to others"
-    elif gain := _gain_without(detections, model):
-        why = f"detections are more probable by {gain:.2g} nats each"
-    else:
-        return None
-    still = without_common_motion(detections)
-    try:
-        estimate = estimate_model(still)
-    except ParameterError:
-        return None
-    choice = choose_method(still, estimate.model, is_estimated=False)
-    reason = f"without the motion that most markers have in common, {why}, {choice.reason}"
-    return replace(choice, reason=reason, estimate=estimate)
-
-
-def _gain_without(detections: Detections, model: TrackingModel) -> float:
-    """Return the gain in log density per detection without the motion in common; 0 for none."""
-    n_frames = detections.n_frames * MAX_COMPARED // max(detections.n_points, 1)
-    part = detections.part(0, min(max(n_frames, MIN_TOGETHER), detections.n_frames)).measured()
-    still = without_common_motion(part)
-    try:
-        model_of_rest = estimate_model(still).model
-    except ParameterError:
-        return 0.0
-    found = _quick_tracks(still, model_of_rest)[0]
-    gain = _log_density(found, model_of_rest) - _log_density(_quick_tracks(part, model)[0], model)
-    D, T = part.n_axes, part.n_frames
-    cost = T * D * (D + 1) / 2 * COST * math.log(max(part.n_points / T, 1))
-    return gain / part.n_points if gain > cost else 0.0
-
-
-def _log_density(tracks: Tracks, model: TrackingModel) -> float:
-    """Return the log density of all detections, those without a track as clutter."""
-    scores = track_scores(tracks, model)
-    clutter = len(tracks.labels) * math.log(model.sensor.clutter_density)
-    return float(scores[np.isfinite(scores)].sum()) + clutter
+    return quick_tracks(detections.measured(), model)[1] > CONFUSED
 
 
 def _bodies(tracks: Tracks, model: TrackingModel) -> Choice | None:

@@ -13,9 +13,10 @@ from asterism.errors import ParameterError
 from asterism.model import Capture, Detections, Edit, MarkerSet, Recipe, TrackingModel, Tracks
 from asterism.model.recipe import InputHash, hash_of_edits, versions
 from asterism.records import record
-from asterism.tracking.choose import CONFUSED, Choice, choose_method, without_motion_in_common
+from asterism.tracking.choose import CONFUSED, Choice, choose_method
 from asterism.tracking.estimation import estimate_model
 from asterism.tracking.methods import MCMCDA, SMP, Method, method_by_name, options_of
+from asterism.tracking.motion_in_common import without_motion_in_common
 from asterism.tracking.naming.own_names import has_own_names
 
 if TYPE_CHECKING:
@@ -118,56 +119,61 @@ def plan_tracking(
         _check_start(start, detections)
     for each in edits:
         check_kind("edits", each, Edit, "asterism.io.read_edits(path, detections)")
-    estimate = choice = None
-    if model is None:
-        estimate, choice = _estimated(detections, is_free=method is None and start is None)
-        model = estimate.model
+    if method is None:
+        choice = _chosen(detections, model, start, stitch=stitch is True)
+    else:
+        estimate = estimate_model(detections) if model is None else None
+        choice = Choice(method=method, stitch=stitch is True, reason="", estimate=estimate)
+    is_stitched = choice.stitch if stitch == "auto" else stitch
+    is_searched = choice.rivals > CONFUSED and choice.method.name == MCMCDA.name
+    model = model if choice.estimate is None else choice.estimate.model
     check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
-    is_chosen = method is None
-    if choice is None and is_chosen:
-        if stitch is True and start is None:
-            choice = Choice(method=SMP(window=3), stitch=True, reason="stitching is requested")
-        else:
-            choice = choose_method(
-                detections, model, has_start=start is not None, is_estimated=estimate is not None
-            )
-    if choice is not None:
-        if stitch is True and not choice.stitch and start is None:
-            reason = f"{choice.reason}; stitching is requested"
-            choice = replace(choice, method=SMP(window=3), stitch=True, reason=reason)
-        method, stitch = choice.method, choice.stitch if stitch == "auto" else stitch
-        if choice.estimate is not None:
-            estimate, model = choice.estimate, choice.estimate.model
-    assert method is not None
-    is_searched = choice is not None and choice.rivals > CONFUSED and method.name == MCMCDA.name
+    assert model is not None
     recipe = Recipe(
-        method=method.name,
-        options=options_of(method),
+        method=choice.method.name,
+        options=options_of(choice.method),
         model=model,
-        stitch=stitch is True,
+        stitch=is_stitched,
         seed=seed,
         has_start=start is not None,
-        reason="" if choice is None else choice.reason,
+        reason=choice.reason,
         markers=hash_of_names(detections, marker_sets),
         edits=hash_of_edits(edits),
         fill=fill,
         input_hash=InputHash((detections, None if start is None else start.labels)),
         versions=versions(),
-        retry=is_chosen and start is None and (stitch is True or is_searched),
-        common_motion=choice is not None and choice.estimate is not None,
+        retry=method is None and start is None and (is_stitched or is_searched),
+        common_motion=choice.common_motion,
     )
-    return Plan(recipe=recipe, method=method, estimate=estimate)
+    return Plan(recipe=recipe, method=choice.method, estimate=choice.estimate)
 
 
-def _estimated(detections: Detections, *, is_free: bool) -> tuple[ModelEstimate, Choice | None]:
-    """Estimate the model of a capture as it is, or, if it cannot be, without a motion in common."""
+def _chosen(
+    detections: Detections, model: TrackingModel | None, start: Tracks | None, *, stitch: bool
+) -> Choice:
+    """Return the choice for a capture, with the estimate of its model unless it was given.
+
+    A given model holds for the capture as it is.
+    """
+    has_start, estimate = start is not None, None
     try:
-        return estimate_model(detections), None
+        if model is None:
+            estimate = estimate_model(detections)
+            model = estimate.model
     except ParameterError:
-        choice = without_motion_in_common(detections, None) if is_free else None
-        if choice is None or choice.estimate is None:
+        choice = None if has_start else without_motion_in_common(detections, None)
+        if choice is None:
             raise
-        return choice.estimate, choice
+    else:
+        choice = choose_method(detections, model, has_start=has_start)
+        choice = replace(choice, estimate=estimate)
+        # Bodies that move apart would be lost in the coordinates of one: see `most_certain`.
+        if estimate is not None and choice.rivals > CONFUSED and not choice.stitch:
+            choice = without_motion_in_common(detections, model) or choice
+    if stitch and not choice.stitch and not has_start:
+        reason = f"{choice.reason}; stitching is requested"
+        return replace(choice, method=SMP(window=3), stitch=True, reason=reason)
+    return choice
 
 
 def _check_start(start: Tracks, detections: Detections) -> None:

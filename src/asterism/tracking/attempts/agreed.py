@@ -10,27 +10,20 @@ from asterism.tracking.attempts.attempt import attempt
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from asterism.model import Detections, Recipe, Tracks
+    from asterism.model import Detections, Recipe
     from asterism.tracking.attempts.uncorrected import Uncorrected
-    from asterism.tracking.methods import Method
 
 __all__ = ["until_agreed"]
 
 AGREEMENT = 1e-3
 """Largest difference between the log posteriors of two searches that agree, nats per detection. It
 is at least 1 nat for the capture."""
-SEARCHES = 2
 GROWTH = (1, 4, 16)
 """Moves of a search in those of the recipe, from one pair of searches to the next."""
 
 
 def until_agreed(
-    recipe: Recipe,
-    detections: Detections,
-    method: Method[Any] | None = None,
-    *,
-    start: Tracks | None = None,
-    progress: Callable[[int], Any] | None = None,
+    recipe: Recipe, detections: Detections, progress: Callable[[int], Any] | None = None
 ) -> Uncorrected:
     """Search twice with independent chains, with ever more moves until both agree.
 
@@ -39,11 +32,10 @@ def until_agreed(
 
     Parameters
     ----------
-    recipe, detections, method, start, progress
+    recipe, detections, progress
         As for `asterism.tracking.carry_out`; the method is `MCMCDA`.
     """
-    del method  # its options are in the recipe
-    n, done, whole = detections.n_frames, 0, SEARCHES * sum(GROWTH)
+    n, done, whole = detections.n_frames, 0, 2 * sum(GROWTH)
     best, moves, apart, is_agreed = None, 0.0, 0.0, False
 
     def advance(frames: int) -> None:
@@ -54,9 +46,9 @@ def until_agreed(
         moves = growth * recipe.options["moves"]
         once = dataclasses.replace(recipe, retry=False, options={**recipe.options, "moves": moves})
         pair = []
-        for k in range(SEARCHES):
+        for k in range(2):
             searched = dataclasses.replace(once, seed=(recipe.seed or 0) + k)
-            pair.append(attempt(searched, detections, start=start, progress=advance))
+            pair.append(attempt(searched, detections, progress=advance))
             done += growth
         best = max([*pair] if best is None else [best, *pair], key=_log_posterior)
         apart = abs(_log_posterior(pair[0]) - _log_posterior(pair[1]))

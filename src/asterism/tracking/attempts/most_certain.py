@@ -14,13 +14,14 @@ from asterism.tracking.attempts.attempt import attempt, next_pass
 from asterism.tracking.attempts.halves import Halves
 from asterism.tracking.attempts.own_distances import assigned_again, refined_by_own_distances
 from asterism.tracking.attempts.uncorrected import DOUBTFUL, Uncorrected
-from asterism.tracking.choose import has_many_rivals, without_motion_in_common
+from asterism.tracking.choose import has_many_rivals
 from asterism.tracking.estimation import (
     OVER_THREE_FRAMES,
     fit_body_motion,
     without_common_motion,
 )
 from asterism.tracking.methods import GNN, MCMCDA, SMP, TOMHT, Rigidity, options_of
+from asterism.tracking.motion_in_common import without_motion_in_common
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -51,25 +52,21 @@ def carried_out(
     recipe, detections, method, start, progress
         As for `asterism.tracking.carry_out`.
     """
-    make = attempt
-    if recipe.retry:
-        is_search = recipe.method == MCMCDA.name and not recipe.stitch
-        make = until_agreed if is_search else most_certain
-    if not recipe.common_motion:
-        return make(recipe, detections, method, start=start, progress=progress)
-    still = without_common_motion(detections)
-    found = make(recipe, still, method, start=start, progress=progress)
+    used = without_common_motion(detections) if recipe.common_motion else detections
+    if not recipe.retry:
+        found = attempt(recipe, used, method, start=start, progress=progress)
+    elif recipe.method == MCMCDA.name and not recipe.stitch:
+        found = until_agreed(recipe, used, progress)
+    else:
+        found = most_certain(recipe, used, progress)
+    if used is detections:
+        return found
     tracks = dataclasses.replace(found.tracks, detections=detections.measured())
-    return dataclasses.replace(found, tracks=tracks, still=still)
+    return dataclasses.replace(found, tracks=tracks, still=used)
 
 
 def most_certain(
-    recipe: Recipe,
-    detections: Detections,
-    method: Method[Any] | None = None,
-    *,
-    start: Tracks | None = None,
-    progress: Callable[[int], Any] | None = None,
+    recipe: Recipe, detections: Detections, progress: Callable[[int], Any] | None = None
 ) -> Uncorrected:
     """Make attempts while identities are uncertain, and return the most certain result.
 
@@ -86,12 +83,12 @@ def most_certain(
 
     Parameters
     ----------
-    recipe, detections, method, start, progress
-        As for `carry_out`.
+    recipe, detections, progress
+        As for `carry_out`; the method is the one that was chosen.
     """
     parts = Halves(detections.n_frames, progress)
     margin = DOUBTFUL * detections.n_points
-    first = attempt(recipe, detections, method, start=start, progress=parts.next())
+    first = attempt(recipe, detections, progress=parts.next())
     best = first
     # A recipe by another method, or with several passes, is that of a further attempt already.
     is_first = recipe.method == SMP.name and recipe.passes == 1
@@ -166,8 +163,7 @@ def _without_motion_in_common(
         model=choice.estimate.model, reason=choice.reason, common_motion=True,
     )  # fmt: skip
     found = carried_out(other, detections, progress=progress)
-    recipe = dataclasses.replace(found.recipe, reason=choice.reason)
-    return dataclasses.replace(found, recipe=recipe, estimate=choice.estimate)
+    return dataclasses.replace(found, estimate=choice.estimate)
 
 
 def _more_certain(before: Uncorrected, other: Uncorrected, margin: float) -> Uncorrected:
@@ -182,9 +178,10 @@ def _with_reason(best: Uncorrected, first: Uncorrected) -> Uncorrected:
     if (recipe.options, recipe.label) == (other.options, other.label) and not is_still:
         return best
     share, less = (100 * each.expected_right / len(each.tracks.labels) for each in (best, first))
+    by = "with this motion, by" if is_still else "with"
     reason = (
         f"{recipe.reason}; {share:.1f} % of the detections are expected to have the right "
-        f"identity, against {less:.1f} % with {other.label}" + " and this motion" * is_still
+        f"identity, against {less:.1f} % {by} {other.label}"
     )
     recipe = dataclasses.replace(recipe, reason=reason)
     tracks = dataclasses.replace(best.tracks, recipe=recipe)

@@ -1,0 +1,78 @@
+"""Captures that are more probable without the motion that most markers have in common."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.errors import ParameterError
+from asterism.model.posterior import track_scores
+from asterism.tracking.choose import Choice, choose_method, quick_tracks
+from asterism.tracking.estimation import estimate_model, without_common_motion
+from asterism.tracking.rigidity.distances import MIN_TOGETHER
+
+if TYPE_CHECKING:
+    from asterism.model import Detections, TrackingModel, Tracks
+
+__all__ = ["without_motion_in_common"]
+
+COST = 0.5
+"""Cost of a coordinate or an angle of a motion in common, in the logarithm of the number of
+detections of a frame (BIC), nats."""
+MAX_COMPARED = 20_000
+"""Number of detections at the beginning of a capture that show whether there is one."""
+
+
+def without_motion_in_common(detections: Detections, model: TrackingModel | None) -> Choice | None:
+    """Return the choice without the motion in common, None if that explains too little.
+
+    The detections must be more probable by more than this motion costs: half the logarithm of the
+    number of detections of a frame for each of its coordinates and angles (BIC).
+
+    Parameters
+    ----------
+    detections : Detections
+        Capture.
+    model : TrackingModel or None
+        Its model; None if none can be estimated, so that nothing is left to compare with.
+    """
+    if model is None:
+        why = "as no marker is nearer to its next position than to others"
+    elif gain := _gain_without(detections, model):
+        why = f"which raises the log density of a detection by {gain:.2g}"
+    else:
+        return None
+    still = without_common_motion(detections)
+    try:
+        estimate = estimate_model(still)
+    except ParameterError:
+        return None
+    choice = choose_method(still, estimate.model)
+    reason = f"without the motion that most markers have in common, {why}, {choice.reason}"
+    return replace(choice, reason=reason, estimate=estimate, common_motion=True)
+
+
+def _gain_without(detections: Detections, model: TrackingModel) -> float:
+    """Return the gain in log density per detection without the motion in common; 0 for none."""
+    n_frames = detections.n_frames * MAX_COMPARED // max(detections.n_points, 1)
+    part = detections.part(0, min(max(n_frames, MIN_TOGETHER), detections.n_frames)).measured()
+    still = without_common_motion(part)
+    try:
+        model_of_rest = estimate_model(still).model
+    except ParameterError:
+        return 0.0
+    found = quick_tracks(still, model_of_rest)[0]
+    gain = _log_density(found, model_of_rest) - _log_density(quick_tracks(part, model)[0], model)
+    D, T = part.n_axes, part.n_frames
+    cost = T * D * (D + 1) / 2 * COST * math.log(max(part.n_points / T, 1))
+    return gain / part.n_points if gain > cost else 0.0
+
+
+def _log_density(tracks: Tracks, model: TrackingModel) -> float:
+    """Return the log density of all detections, those without a track as clutter."""
+    scores = track_scores(tracks, model)
+    clutter = len(tracks.labels) * math.log(model.sensor.clutter_density)
+    return float(scores[np.isfinite(scores)].sum()) + clutter
