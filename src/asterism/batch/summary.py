@@ -165,8 +165,9 @@ def stitching_rows(info: Mapping[str, float]) -> list[tuple[str, str]]:
     """Return the result of stitching as rows of the printed table; empty without stitching."""
     if "joins" not in info:
         return []
-    text = f"{info['joins']:.0f} joins, {info['cuts']:.0f} links cut, {info['ghosts']:.0f} ghosts"
-    return [("stitching", text)]
+    parts = {"joins": "join", "cuts": "cut link", "ghosts": "ghost"}
+    text = (f"{info[key]:.0f} {part}{'s' * (info[key] != 1)}" for key, part in parts.items())
+    return [("stitching", ", ".join(text))]
 
 
 def summarize(
