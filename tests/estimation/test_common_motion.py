@@ -276,9 +276,9 @@ def test_edits_are_made_in_the_coordinates_of_the_capture(tmp_path):
 
 def hand(seed):
     """A hand with moving fingers, 3 mm of noise, that moves as a whole by 11 mm a frame."""
-    fingers = am.simulate.fingers(frames=300, rate=120, seed=seed)
+    fingers = am.simulate.fingers(frames=150, rate=120, seed=seed)
     rng = np.random.default_rng(seed)
-    t = np.arange(300)[:, None, None] / 120
+    t = np.arange(150)[:, None, None] / 120
     common = 0.2 * np.sin(2 * np.pi * (rng.uniform(1, 2, 3) * t + rng.uniform(size=3)))
     take = am.Tracks.from_dense(t[:, 0, 0], fingers.positions() + common)
     return am.simulate.corrupt(take, missing=0.1, clutter=0.1, noise=3e-3, seed=seed)
