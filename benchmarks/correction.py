@@ -410,7 +410,7 @@ def main() -> None:
                     path.stem, name, f"{oracle:.4f}", f"{before:.4f}",
                     f"{idf1(made.labels, truth):.4f}", str(links), str(made.actions),
                     str(made.looks), str(hand),
-                    f"{1000 * np.median(made.seconds):.0f}",
+                    f"{1000 * np.median(made.seconds):.0f}" if made.seconds else "–",
                 ]
             )  # fmt: skip
             print(*rows[-1], f"refused {made.refused}", flush=True)
