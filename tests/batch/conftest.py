@@ -55,6 +55,14 @@ def truncated(captures):
     return path
 
 
+@pytest.fixture
+def whole(captures):
+    """That copy without the damaged file and the notes, so that every capture has a result."""
+    for name in ("damaged.c3d", "notes.csv"):
+        (captures / "second" / name).unlink()
+    return captures
+
+
 @pytest.fixture(scope="session")
 def batch(made_captures, tmp_path_factory):
     """A batch that was never stopped."""

@@ -153,7 +153,7 @@ def test_arguments_are_made_when_they_are_sent():
 @pytest.mark.filterwarnings("ignore")
 def test_a_task_that_kills_its_workers_fails_alone():
     # Dask tries it on four workers otherwise, and each one that dies is started again.
-    with dask.config.set({"distributed.scheduler.allowed-failures": 1}):
+    with dask.config.set({"distributed.scheduler.allowed-failures": 0}):
         results = found(deadly, range(6), scheduler=None, workers=2, patience=20.0)
     assert type(results.pop("2")).__name__ == "KilledWorker"
     assert results == {f"{x}": x for x in range(6) if x != 2}

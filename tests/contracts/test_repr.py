@@ -67,6 +67,7 @@ def instances():
     model = dataclasses.replace(plain, motion=several)
     rig = am.Rig.ring(30, radius=4, height=2)
     film = am.simulate.film(truth, rig)
+    marker_set = am.learn_marker_set(truth)
     tracks = am.track(d, am.JPDA(), model=plain)
     aligned = am.metrics.align(tracks, truth)
     labels = aligned.labels, aligned.truth_labels
@@ -97,8 +98,8 @@ def instances():
         am.tracking.ChainOptions(groups="cells", distance=1 / 3),
         am.tracking.Stitched(), am.tracking.Stitched().init(plain), state, update,
         update.tracks, am.tracking.track_states(truth, model=plain),
-        am.tracking.Named(marker_sets=am.learn_marker_set(truth), method=am.GNN()),
-        am.tracking.Named(marker_sets=am.learn_marker_set(truth), method=am.GNN()).init(plain),
+        am.tracking.Named(marker_sets=marker_set, method=am.GNN()),
+        am.tracking.Named(marker_sets=marker_set, method=am.GNN()).init(plain),
         am.MCMCDA(window=50, moves=12.345, deadline=1 / 3, confidence=12.345, end_odds=123.4,
                   chains=4, threads=2, chain=am.tracking.ChainOptions(
                       ambiguous_within=3.21, bonds=3, ambiguous_share=0.25,
@@ -130,9 +131,9 @@ def instances():
             kind=2, corners=rng.normal(size=(4, 3)), origin=rng.normal(size=3), channels=(LONG,) * 6
         ),
         am.model.Gap(track=3, first=10, last=20, seconds=1 / 3),
-        am.tracking.learn_bonds(truth), am.learn_marker_set(truth),
+        am.tracking.learn_bonds(truth), marker_set,
         am.tracking.learn_shared_acceleration(truth, plain),
-        am.name_tracks(tracks, am.learn_marker_set(truth)),
+        am.name_tracks(tracks, marker_set),
         am.tracking.Tracked(tracks=tracks, recipe=tracks.recipe),
         settings := am.batch.Settings(method="smp", options={"window": 3}, model=plain, seed=7),
         job := am.batch.Job(
@@ -160,7 +161,7 @@ def instances():
             names={},
         ),
         am.tracking.Correction(truth, plain),
-        am.edit.Session(without_edits(am.track(d).recipe, d), Path(LONG)),
+        am.edit.Session(without_edits(tracks.recipe, d), Path(LONG)),
         am.large.LargeTracker(model=plain, tile=1 / 3), am.large.LargeTracker(model=plain).init(),
         am.large.Columns(axes=(LONG, LONG), label=LONG[:70]),
         am.large.DecidedFrame(number=3, labels=np.zeros(9, dtype=int)),

@@ -1,7 +1,8 @@
-"""``asterism edit`` in processes that are forked from one that has tracked the capture already.
+"""``asterism edit`` in processes that are forked from one that has imported everything already.
 
-A process of its own for each test would import everything and track the same capture again. The
-forked process carries out the whole command, except the tracking of the known capture.
+A process of its own for each test would import it and track the same capture again. The forked
+process carries out the whole command, except the tracking of the known capture, whose tracks it is
+given.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from asterism.edit import session
 
 CAPTURE = "trial.c3d"
 _carry_out = session.without_edits
-_results = []
+_captures, _results = [], []
 
 
 def write_capture(folder):
@@ -34,11 +35,12 @@ def write_capture(folder):
     am.write(truth.detections, Path(folder) / CAPTURE)
 
 
-@functools.cache
 def _capture():
-    with tempfile.TemporaryDirectory() as folder:
-        write_capture(folder)
-        return am.read(Path(folder) / CAPTURE)
+    if not _captures:
+        with tempfile.TemporaryDirectory() as folder:
+            write_capture(folder)
+            _captures.append(am.read(Path(folder) / CAPTURE))
+    return _captures[0]
 
 
 def _known(recipe, detections, *, marker_sets=None, progress=None):
@@ -59,10 +61,16 @@ def _known(recipe, detections, *, marker_sets=None, progress=None):
     return result
 
 
-def track_for_commands():
+def recipe_of(capture, method=None):
+    """Return the settings by which the command tracks a capture."""
+    return am.tracking.plan_tracking(capture, method, seed=0).recipe
+
+
+@functools.cache
+def _track_for_commands():
     """Track the capture by the settings of the commands that the fixtures run."""
     for method in (None, am.GNN()):
-        _known(am.tracking.plan_tracking(_capture(), method, seed=0).recipe, _capture())
+        _known(recipe_of(_capture(), method), _capture())
 
 
 @contextlib.contextmanager
@@ -75,8 +83,10 @@ def tracked_once():
         session.without_edits = _carry_out
 
 
-def _edit(folder, options, out, err):
+def _edit(folder, options, capture, results, out, err):
     """Carry out the command in this process, with its output in two pipes."""
+    _captures.append(capture)
+    _results.extend(results)
     os.chdir(folder)
     for number, name, pipe in ((1, "stdout", out), (2, "stderr", err)):
         os.dup2(pipe.fileno(), number)
@@ -97,9 +107,11 @@ class Forked:
     def __init__(self, folder, options):
         context = multiprocessing.get_context("forkserver")
         context.set_forkserver_preload(["tests.edit.preloaded"])
+        _track_for_commands()
         ends = [context.Pipe(duplex=False) for _ in range(2)]
         writers = [writer for _, writer in ends]
-        self._process = context.Process(target=_edit, args=(str(folder), options, *writers))
+        known = (_capture(), _results)
+        self._process = context.Process(target=_edit, args=(str(folder), options, *known, *writers))
         self._process.start()
         for writer in writers:
             writer.close()

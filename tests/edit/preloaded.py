@@ -1,11 +1,5 @@
-"""Import and track what the editors of the tests need, in the process that forks them."""
-
-import sys
+"""Import what the editors of the tests need, in the process that forks them."""
 
 import asterism.cli.commands.edit
 import asterism.cli.commands.track  # noqa: F401
-from tests.edit.editors import track_for_commands
-
-# The search for doctests imports every module.
-if "pytest" not in sys.modules:
-    track_for_commands()
+from tests.edit import editors  # noqa: F401

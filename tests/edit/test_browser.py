@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import asterism as am
+from tests.edit.editors import recipe_of
 from tests.edit.served import CAPTURE
 from tests.reporting.browser import CHROMIUM
 
@@ -38,8 +39,7 @@ def edits_of(served):
 
 def session_of(served, method=None, path="trial.edits.toml"):
     capture = am.read(served.folder / CAPTURE)
-    recipe = None if method is None else am.tracking.plan_tracking(capture, method).recipe
-    return am.edit.Session.open(capture, served.folder / path, recipe)
+    return am.edit.Session.open(capture, served.folder / path, recipe_of(capture, method))
 
 
 def centre(page, selector):

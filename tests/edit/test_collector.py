@@ -8,7 +8,7 @@ import pytest
 import asterism as am
 from asterism.cli import main
 from asterism.reporting.page.head import bundled
-from tests.edit.served import CAPTURE
+from tests.edit.served import CAPTURE, write_capture
 from tests.reporting.browser import CHROMIUM
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium: apt-get install chromium")
@@ -22,9 +22,17 @@ KEEP_DOWNLOADS = """
 """
 
 
+@pytest.fixture(scope="module")
+def tracks(tmp_path_factory):
+    """The capture with its tracks, by a method that takes no time."""
+    folder = tmp_path_factory.mktemp("tracks")
+    write_capture(folder)
+    return am.track(am.read(folder / CAPTURE), am.GNN())
+
+
 def test_collected_edits_are_those_of_the_capture(browser, folder, monkeypatch):
     monkeypatch.chdir(folder)
-    assert main(["track", CAPTURE, "-o", "tracked.csv", "-q"]) == 0
+    assert main(["track", CAPTURE, "--method", "gnn", "-o", "tracked.csv", "-q"]) == 0
     assert main(["report", "tracked.csv", "--editor", "-q"]) == 0
     page = browser.page(folder / "tracked.html", before=KEEP_DOWNLOADS)
     state = "document.getElementById('edit-state').textContent"
@@ -56,19 +64,18 @@ def test_collected_edits_are_those_of_the_capture(browser, folder, monkeypatch):
     assert all(url.startswith(("file:", "blob:")) for url in page.requests())
     page.close()
     # They are respected by the tracking of the same file.
-    line = "track tracked.csv --edits tracked.edits.toml -o again.csv -q"
+    line = "track tracked.csv --method gnn --edits tracked.edits.toml -o again.csv -q"
     assert main(line.split()) == 0
     again = am.io.read_tracks(folder / "again.csv")
     assert again.names[again.labels[capture.offsets[name.at[0][0]] + name.at[0][1]]] == 'C7 "a"'
 
 
-def test_a_track_is_not_cut_where_the_page_hides_frames(browser, folder, monkeypatch):
-    tracks = am.track(am.read(folder / CAPTURE))
+def test_a_track_is_not_cut_where_the_page_hides_frames(browser, tracks, tmp_path, monkeypatch):
     monkeypatch.setattr(
         "asterism.reporting.page.thinning.MOST_POINTS", tracks.detections.n_points // 2
     )
-    am.report(tracks, folder / "thinned.html", editor=True)
-    page = browser.page(folder / "thinned.html")
+    am.report(tracks, tmp_path / "thinned.html", editor=True)
+    page = browser.page(tmp_path / "thinned.html")
     state, error = (f"document.getElementById('edit-{name}').textContent"
                     for name in ("state", "error"))  # fmt: skip
     page.run("asterism.seek(20); asterism.choose(3)")
@@ -80,11 +87,10 @@ def test_a_track_is_not_cut_where_the_page_hides_frames(browser, folder, monkeyp
     page.close()
 
 
-def test_pages_without_an_editor_carry_none_of_it(folder):
-    tracks = am.track(am.read(folder / CAPTURE))
-    am.report(tracks, folder / "plain.html")
-    am.report(tracks, folder / "editor.html", editor=True)
-    plain, editor = ((folder / f"{name}.html").read_bytes() for name in ("plain", "editor"))
+def test_pages_without_an_editor_carry_none_of_it(tracks, tmp_path):
+    am.report(tracks, tmp_path / "plain.html")
+    am.report(tracks, tmp_path / "editor.html", editor=True)
+    plain, editor = ((tmp_path / f"{name}.html").read_bytes() for name in ("plain", "editor"))
     assert b"edit-swap" not in plain
     script = bundled("editor.js").encode()
     assert script in editor

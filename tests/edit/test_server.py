@@ -9,14 +9,15 @@ import numpy as np
 
 import asterism as am
 from asterism.edit.hub import Hub
+from tests.edit.editors import recipe_of
 from tests.edit.served import CAPTURE, Served, wait
 
 
-def same(served):
+def same(served, method=None):
     """Return an edit that joins the detections of two tracks of the first frame later on."""
-    tracks = am.edit.Session.open(
-        am.read(served.folder / CAPTURE), served.folder / "no.toml"
-    ).tracks
+    capture = am.read(served.folder / CAPTURE)
+    recipe, path = recipe_of(capture, method), served.folder / "no.toml"
+    tracks = am.edit.Session.open(capture, path, recipe).tracks
     own = np.flatnonzero(tracks.labels == 3)
     other = np.flatnonzero(tracks.labels == 4)
     frame = tracks.detections.frame_of
@@ -34,7 +35,7 @@ def test_an_edit_is_on_disk_when_it_is_answered(served):
     assert answer["version"] == 1
     assert len(answer["edits"]) == 1
     # The answer holds what changed, and nothing else.
-    session = am.edit.Session.open(capture, path)
+    session = am.edit.Session.open(capture, path, recipe_of(capture))
     changed = np.flatnonzero(session.tracks.labels != tracks.labels)
     assert answer["detections"] == changed.tolist()
     assert answer["labels"] == session.tracks.labels[changed].tolist()
@@ -81,9 +82,7 @@ def test_an_assignment_is_on_disk_once_it_is_confirmed_and_not_before(by_method)
     assert am.io.read_edits(path, capture)[1].kind == "reassign_even"
     by_method.post("undo")
     assert by_method.post("preview_reassign")[0] == 400
-    session = am.edit.Session.open(
-        capture, path, am.tracking.plan_tracking(capture, am.GNN()).recipe
-    )
+    session = am.edit.Session.open(capture, path, recipe_of(capture, am.GNN()))
     assert session.tracks.labels[answer["detections"]].tolist() == answer["labels"]
     assert by_method.post("edit", kind="reassign", detections=[0], name="")[0] != 200
 
@@ -170,27 +169,29 @@ def test_decisions_are_chosen_and_followed(served):
                for each in then["decisions"])  # fmt: skip
 
 
-def test_saved_files_are_named_and_never_the_input(served):
-    _, message = same(served)
-    served.post("edit", **message)
-    input = (served.folder / CAPTURE).read_bytes()
+def test_saved_files_are_named_and_never_the_input(by_method):
+    _, message = same(by_method, am.GNN())
+    by_method.post("edit", **message)
+    capture, folder = am.read(by_method.folder / CAPTURE), by_method.folder
+    input = (folder / CAPTURE).read_bytes()
     for _ in range(2):  # the second time it replaces what it wrote itself
-        status, answer = served.post("save")
+        status, answer = by_method.post("save")
         assert (status, answer["saved"]) == (200, "trial.corrected.c3d")
-    assert (served.folder / CAPTURE).read_bytes() == input
-    saved = am.io.read_tracks(served.folder / "trial.corrected.c3d")
-    edits = am.io.read_edits(served.folder / "trial.edits.toml", am.read(served.folder / CAPTURE))
-    expected = am.track(am.read(served.folder / CAPTURE), edits=edits)
+    assert (folder / CAPTURE).read_bytes() == input
+    saved = am.io.read_tracks(folder / "trial.corrected.c3d")
+    edits = am.io.read_edits(folder / "trial.edits.toml", capture)
+    expected = am.track(capture, am.GNN(), edits=edits)
     assert saved.n_tracks == expected.n_tracks
 
 
 def test_a_session_is_continued_and_stopped(folder):
-    served = Served(folder, is_command=True)
-    _, message = same(served)
-    served.post("edit", **message)
+    by_method = ("--method", "gnn")
+    served = Served(folder, *by_method, is_command=True)
+    _, message = same(served, am.GNN())
+    assert served.post("edit", **message)[0] == 200
     served.listen()  # an open page does not hold it up
     assert served.stop(signal.SIGTERM)[0] == 0
-    served = Served(folder, is_command=True)
+    served = Served(folder, *by_method, is_command=True)
     events = served.listen()
     wait(lambda: bool(events))
     assert len(events[0][1]["edits"]) == 1
