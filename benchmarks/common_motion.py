@@ -70,8 +70,8 @@ def hand(size: float, seed: int) -> am.Tracks:
 def with_it(d: am.Detections) -> am.Tracks:
     """Track with the motion in common."""
     with (
-        mock.patch.object(plan, "without_motion_in_common", return_value=None),
-        mock.patch.object(most_certain, "without_motion_in_common", return_value=None),
+        mock.patch.object(plan, "choice_without_common_motion", return_value=None),
+        mock.patch.object(most_certain, "choice_without_common_motion", return_value=None),
     ):
         return am.track(d)
 

@@ -12,7 +12,7 @@ from asterism.cli import main
 from asterism.edit.session import Session
 from asterism.errors import ParameterError
 from asterism.tracking.estimation.common_motion import MIN_PAIRS
-from asterism.tracking.motion_in_common import without_motion_in_common
+from asterism.tracking.motion_in_common import choice_without_common_motion
 from tests.reporting.cases import text_of
 
 
@@ -158,8 +158,9 @@ def test_markers_that_cannot_be_followed_as_they_are_are_tracked_without_it():
     assert found.recipe.common_motion
     assert am.evaluate(found, truth).idf1 > 0.9
     assert found.recipe.reason.startswith("without the motion that most markers have in common")
-    with pytest.raises(ParameterError, match="followed"):
-        am.track(truth.detections, "gnn")
+    for given in ({"method": "gnn"}, {"start": truth}):
+        with pytest.raises(ParameterError, match="followed"):
+            am.tracking.plan_tracking(truth.detections, **given)
 
 
 def test_gaps_and_states_need_no_model_that_cannot_be_estimated(tmp_path):
@@ -294,6 +295,7 @@ def test_uncertain_bodies_are_tracked_without_it_if_that_is_more_certain():
     assert found.recipe.common_motion
     assert found.recipe.reason.startswith("without the motion that most markers have in common")
     assert "with this motion, by" in found.recipe.reason
+    assert found.recipe.reason.count("are expected to have") == 1
     without = am.tracking.without_common_motion(truth.detections)
     assert tracked.estimate.model == am.estimate_model(without).model
     assert am.evaluate(found, truth).idf1 > 0.99
@@ -301,7 +303,7 @@ def test_uncertain_bodies_are_tracked_without_it_if_that_is_more_certain():
     assert again.recipe == found.recipe
     assert np.array_equal(again.labels, found.labels)
     with pytest.MonkeyPatch.context() as patch:
-        name = "asterism.tracking.attempts.most_certain.without_motion_in_common"
+        name = "asterism.tracking.attempts.most_certain.choice_without_common_motion"
         patch.setattr(name, lambda *_: None)
         with_it = am.track(truth.detections)
     assert am.evaluate(found, truth).idf1 > am.evaluate(with_it, truth).idf1
@@ -325,9 +327,9 @@ def test_a_motion_that_explains_less_than_it_costs_stays(monkeypatch):
     take = am.simulate.fingers(frames=300, rate=120, seed=1)  # its wrist moves by 1 mm a frame
     d = am.simulate.corrupt(take, noise=3e-3, seed=1).detections
     model = am.estimate_model(d).model
-    assert without_motion_in_common(d, model) is None
+    assert choice_without_common_motion(d, model) is None
     monkeypatch.setattr("asterism.tracking.motion_in_common.COST", 0.0)
-    assert without_motion_in_common(d, model) is not None
+    assert choice_without_common_motion(d, model) is not None
 
 
 def test_independent_markers_and_people_are_tracked_as_they_are(monkeypatch):
@@ -345,3 +347,7 @@ def test_a_choice_without_it_is_not_offered_for_a_given_model():
     plans = [am.tracking.plan_tracking(truth.detections, model=each) for each in (None, model)]
     assert [each.recipe.common_motion for each in plans] == [True, False]
     assert plans[1].recipe.model == model
+    assert plans[1].estimate is None
+    for method, stitch, is_removed in (("mcmcda", "auto", 0), (None, False, 1), (None, True, 0)):
+        plan = am.tracking.plan_tracking(truth.detections, method, stitch=stitch)
+        assert plan.recipe.common_motion == is_removed

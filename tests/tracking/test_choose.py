@@ -78,6 +78,16 @@ def test_the_method_is_chosen_by_the_capture_with_a_reason(name):
     assert choice == am.tracking.choose_method(truth.detections, model)
 
 
+@pytest.mark.parametrize("stitch", [True, np.True_, 1])
+@pytest.mark.parametrize("name", ["bodies", "independent and dense"])
+def test_requested_stitching_decides_without_a_measurement(name, stitch, monkeypatch):
+    truth, model = clip(name)
+    monkeypatch.setattr("asterism.tracking.plan.choose_method", None)
+    recipe = am.tracking.plan_tracking(truth.detections, model=model, stitch=stitch).recipe
+    assert (recipe.method, recipe.stitch, recipe.retry) == ("smp", True, True)
+    assert (type(recipe.stitch), recipe.reason) == (bool, "stitching is requested")
+
+
 def test_no_method_is_the_one_that_was_chosen():
     truth, model = clip("bodies")
     tracks = am.track(truth.detections, model=model, seed=1)
@@ -547,7 +557,7 @@ def test_json_holds_the_choice_and_auto_may_be_named(person, capsys):
 
 @pytest.fixture
 def walk_planned(monkeypatch):
-    """A walk, its recipe, and the ways of the attempts at it, which make `Planned` tracks."""
+    """A walk, its recipe, and the ways of the attempts at it, which return `Planned` tracks."""
     walk, made = am.simulate.person(activity="walk", frames=60, seed=1), []
 
     def planned(recipe, *_, **__):
@@ -558,7 +568,7 @@ def walk_planned(monkeypatch):
     monkeypatch.setattr(f"{MOST_CERTAIN}.refined_by_own_distances", lambda found: found)
     monkeypatch.setattr(f"{MOST_CERTAIN}.assigned_again", lambda found: found)
     monkeypatch.setattr(f"{MOST_CERTAIN}.has_many_rivals", lambda *_: False)
-    monkeypatch.setattr(f"{MOST_CERTAIN}.without_motion_in_common", lambda *_: None)
+    monkeypatch.setattr(f"{MOST_CERTAIN}.choice_without_common_motion", lambda *_: None)
     shares = {"smp": 0.7, "tomht": 0.8, "bonds": 0.7, "gnn": 0.1}
     monkeypatch.setattr(Planned, "shares", shares)
     return walk, am.tracking.plan_tracking(walk.detections).recipe, made
@@ -594,7 +604,7 @@ def test_the_motion_in_common_is_removed_from_bodies_that_are_more_certain_witho
     choice = dataclasses.replace(
         choice, estimate=estimate, common_motion=True, stitch=has_bodies, reason="without it"
     )
-    monkeypatch.setattr(f"{MOST_CERTAIN}.without_motion_in_common", lambda *_: choice)
+    monkeypatch.setattr(f"{MOST_CERTAIN}.choice_without_common_motion", lambda *_: choice)
     best = most_certain(recipe, walk.detections)
     assert best.recipe.common_motion == is_kept
     assert best.recipe.reason.startswith("without it; 80.3 %") == is_kept

@@ -74,13 +74,15 @@ class Choice:
     stitch : bool
         Whether the tracklets of the method are to be stitched.
     reason : str
-        What was measured in the capture and what follows from it, in one line.
+        What was measured in the capture and what follows from it, in one line; empty for a method
+        that the caller names.
     rivals : float
         Number of rival detections per link.
     estimate : ModelEstimate, optional
-        Model for which this holds, if it was estimated with the choice.
+        Estimate of the model with which the method is used; None if the model was given.
     common_motion : bool
         Whether the motion that most markers have in common is removed (`without_common_motion`).
+        `plan_tracking` decides it.
 
     Examples
     --------
@@ -181,6 +183,11 @@ def quick_tracks(detections: Detections, model: TrackingModel) -> tuple[Tracks, 
         Capture.
     model : TrackingModel
         Its model.
+
+    Returns
+    -------
+    tracks : Tracks
+    n_rivals : float
     """
     method = GNN()
     state, labels, _ = method.run(method.init(model, n_axes=detections.n_axes), detections)

@@ -1,4 +1,4 @@
-"""Captures that are more probable without the motion that most markers have in common."""
+"""Choice of a method without the motion that most markers have in common."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from asterism.tracking.rigidity.distances import MIN_TOGETHER
 if TYPE_CHECKING:
     from asterism.model import Detections, TrackingModel, Tracks
 
-__all__ = ["without_motion_in_common"]
+__all__ = ["choice_without_common_motion"]
 
 COST = 0.5
 """Cost of a coordinate or an angle of a motion in common, in the logarithm of the number of
@@ -26,23 +26,32 @@ MAX_COMPARED = 20_000
 """Number of detections at the beginning of a capture that show whether there is one."""
 
 
-def without_motion_in_common(detections: Detections, model: TrackingModel | None) -> Choice | None:
-    """Return the choice without the motion in common, None if that explains too little.
+def choice_without_common_motion(
+    detections: Detections, model: TrackingModel | None
+) -> Choice | None:
+    """Return the choice without the motion in common, or None where that motion stays.
 
-    The detections must be more probable by more than this motion costs: half the logarithm of the
-    number of detections of a frame for each of its coordinates and angles (BIC).
+    With a model, the detections must be more probable without the motion by more than it costs:
+    half the logarithm of the number of detections of a frame for each of its coordinates and
+    angles (BIC). Without one nothing is compared.
 
     Parameters
     ----------
     detections : Detections
         Capture.
     model : TrackingModel or None
-        Its model; None if none can be estimated, so that nothing is left to compare with.
+        Its model; None if none can be estimated.
+
+    Returns
+    -------
+    Choice or None
+        With the estimate of the model for the rest of the motion; None also if none can be
+        estimated.
     """
     if model is None:
-        why = "as no marker is nearer to its next position than to others"
+        why = "with it, no marker is nearer to its next position than to others"
     elif gain := _gain_without(detections, model):
-        why = f"which raises the log density of a detection by {gain:.2g}"
+        why = f"its removal raises the log density by {gain:.2g} nats per detection"
     else:
         return None
     still = without_common_motion(detections)
@@ -51,7 +60,7 @@ def without_motion_in_common(detections: Detections, model: TrackingModel | None
     except ParameterError:
         return None
     choice = choose_method(still, estimate.model)
-    reason = f"without the motion that most markers have in common, {why}, {choice.reason}"
+    reason = f"without the motion that most markers have in common ({why}), {choice.reason}"
     return replace(choice, reason=reason, estimate=estimate, common_motion=True)
 
 

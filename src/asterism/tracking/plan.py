@@ -16,7 +16,7 @@ from asterism.records import record
 from asterism.tracking.choose import CONFUSED, Choice, choose_method
 from asterism.tracking.estimation import estimate_model
 from asterism.tracking.methods import MCMCDA, SMP, Method, method_by_name, options_of
-from asterism.tracking.motion_in_common import without_motion_in_common
+from asterism.tracking.motion_in_common import choice_without_common_motion
 from asterism.tracking.naming.own_names import has_own_names
 
 if TYPE_CHECKING:
@@ -73,7 +73,8 @@ def plan_tracking(
     detections : Detections
         Unnamed points.
     method : Method or str, optional
-        Method of association, or its name; by default `choose_method` selects one.
+        Method of association, or its name; by default `choose_method` selects one. If a model is
+        not given either, the motion that most markers have in common may be removed first.
     model : TrackingModel, optional
         Tracking model; by default `estimate_model` estimates it from the capture.
     stitch : bool or "auto", optional
@@ -111,6 +112,7 @@ def plan_tracking(
     check_kind("detections", detections, Detections, "am.Detections.from_frames, or am.read")
     if stitch not in (True, False, "auto"):
         raise ParameterError("stitch", 'True, False or "auto"', repr(stitch))
+    requested = None if stitch == "auto" else bool(stitch)
     if seed is not None:
         check_number("seed", seed, above=0, closed=True, integer=True)
     if method is not None:  # checked before the slow estimation of the model
@@ -120,11 +122,13 @@ def plan_tracking(
     for each in edits:
         check_kind("edits", each, Edit, "asterism.io.read_edits(path, detections)")
     if method is None:
-        choice = _chosen(detections, model, start, stitch=stitch is True)
+        choice = _chosen(
+            detections, model, has_start=start is not None, must_stitch=requested is True
+        )
     else:
         estimate = estimate_model(detections) if model is None else None
-        choice = Choice(method=method, stitch=stitch is True, reason="", estimate=estimate)
-    is_stitched = choice.stitch if stitch == "auto" else stitch
+        choice = Choice(method=method, stitch=requested is True, reason="", estimate=estimate)
+    is_stitched = choice.stitch if requested is None else requested
     is_searched = choice.rivals > CONFUSED and choice.method.name == MCMCDA.name
     model = model if choice.estimate is None else choice.estimate.model
     check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
@@ -149,30 +153,33 @@ def plan_tracking(
 
 
 def _chosen(
-    detections: Detections, model: TrackingModel | None, start: Tracks | None, *, stitch: bool
+    detections: Detections, model: TrackingModel | None, *, has_start: bool, must_stitch: bool
 ) -> Choice:
     """Return the choice for a capture, with the estimate of its model unless it was given.
 
     A given model holds for the capture as it is.
     """
-    has_start, estimate = start is not None, None
+    estimate = None
     try:
         if model is None:
             estimate = estimate_model(detections)
             model = estimate.model
     except ParameterError:
-        choice = None if has_start else without_motion_in_common(detections, None)
+        choice = None if has_start else choice_without_common_motion(detections, None)
         if choice is None:
             raise
-    else:
-        choice = choose_method(detections, model, has_start=has_start)
-        choice = replace(choice, estimate=estimate)
-        # Bodies that move apart would be lost in the coordinates of one: see `most_certain`.
-        if estimate is not None and choice.rivals > CONFUSED and not choice.stitch:
-            choice = without_motion_in_common(detections, model) or choice
-    if stitch and not choice.stitch and not has_start:
-        reason = f"{choice.reason}; stitching is requested"
-        return replace(choice, method=SMP(window=3), stitch=True, reason=reason)
+        if must_stitch and not choice.stitch:
+            reason = f"{choice.reason}; stitching is requested"
+            return replace(choice, method=SMP(window=3), stitch=True, reason=reason)
+        return choice
+    check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
+    if must_stitch and not has_start:
+        reason = "stitching is requested"
+        return Choice(method=SMP(window=3), stitch=True, reason=reason, estimate=estimate)
+    choice = replace(choose_method(detections, model, has_start=has_start), estimate=estimate)
+    # For bodies, `most_certain` decides by the certainty of identities: they may move apart.
+    if estimate is not None and choice.rivals > CONFUSED and not choice.stitch:
+        return choice_without_common_motion(detections, model) or choice
     return choice
 
 

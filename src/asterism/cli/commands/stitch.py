@@ -102,7 +102,7 @@ def stitch(
             ("tracks", f"{figures['n_tracks']}, from {figures['n_tracks_before']}"),
             ("tracklets", str(figures["n_tracklets"])),
             ("joins", str(len(found.joins))),
-            ("links cut", str(len(found.cuts))),
+            ("cut links", str(len(found.cuts))),
             ("ghosts", str(len(found.ghosts))),
             *bond_rows(found.bonds),
             *_least_certain(found, capture),

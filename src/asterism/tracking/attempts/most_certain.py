@@ -21,7 +21,7 @@ from asterism.tracking.estimation import (
     without_common_motion,
 )
 from asterism.tracking.methods import GNN, MCMCDA, SMP, TOMHT, Rigidity, options_of
-from asterism.tracking.motion_in_common import without_motion_in_common
+from asterism.tracking.motion_in_common import choice_without_common_motion
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -50,19 +50,21 @@ def carried_out(
     Parameters
     ----------
     recipe, detections, method, start, progress
-        As for `asterism.tracking.carry_out`.
+        As for `asterism.tracking.carry_out`. A recipe with further attempts has a method of
+        `METHODS` and no initial tracks.
     """
-    used = without_common_motion(detections) if recipe.common_motion else detections
+    still = without_common_motion(detections) if recipe.common_motion else None
+    modelled = detections if still is None else still
     if not recipe.retry:
-        found = attempt(recipe, used, method, start=start, progress=progress)
+        found = attempt(recipe, modelled, method, start=start, progress=progress)
     elif recipe.method == MCMCDA.name and not recipe.stitch:
-        found = until_agreed(recipe, used, progress)
+        found = until_agreed(recipe, modelled, progress)
     else:
-        found = most_certain(recipe, used, progress)
-    if used is detections:
+        found = most_certain(recipe, modelled, progress)
+    if still is None:
         return found
     tracks = dataclasses.replace(found.tracks, detections=detections.measured())
-    return dataclasses.replace(found, tracks=tracks, still=used)
+    return dataclasses.replace(found, tracks=tracks, still=still)
 
 
 def most_certain(
@@ -84,7 +86,7 @@ def most_certain(
     Parameters
     ----------
     recipe, detections, progress
-        As for `carry_out`; the method is the one that was chosen.
+        As for `carry_out`; the method is built from the recipe.
     """
     parts = Halves(detections.n_frames, progress)
     margin = DOUBTFUL * detections.n_points
@@ -112,7 +114,7 @@ def most_certain(
         searched = refined_by_own_distances(_by(SEARCH, recipe, detections, parts.next()))
         best = _more_certain(best, _with_reason(assigned_again(searched), first), margin)
     if best.is_doubtful and is_first and not recipe.common_motion:
-        still = _without_motion_in_common(recipe, detections, parts.next())
+        still = _attempt_without_common_motion(recipe, detections, parts.next())
         if still is not None:
             best = _more_certain(best, _with_reason(still, best), margin)
     parts.end()
@@ -147,14 +149,14 @@ def _by_bonds(
     return _by(TOMHT(rigid=Rigidity()), bodies, detections, progress)
 
 
-def _without_motion_in_common(
+def _attempt_without_common_motion(
     recipe: Recipe, detections: Detections, progress: Callable[[int], Any]
 ) -> Uncorrected | None:
     """Track without the motion that most markers have in common.
 
     None if this motion explains too little, or if there are no bodies without it.
     """
-    choice = without_motion_in_common(detections, recipe.model)
+    choice = choice_without_common_motion(detections, recipe.model)
     # Bodies are still bodies then, and confidence from their distances is comparable.
     if choice is None or choice.estimate is None or not choice.stitch:
         return None
@@ -163,7 +165,9 @@ def _without_motion_in_common(
         model=choice.estimate.model, reason=choice.reason, common_motion=True,
     )  # fmt: skip
     found = carried_out(other, detections, progress=progress)
-    return dataclasses.replace(found, estimate=choice.estimate)
+    # One comparison is stated: that with the result in this motion.
+    recipe = dataclasses.replace(found.recipe, reason=choice.reason)
+    return dataclasses.replace(found, recipe=recipe, estimate=choice.estimate)
 
 
 def _more_certain(before: Uncorrected, other: Uncorrected, margin: float) -> Uncorrected:
