@@ -11,6 +11,18 @@
 
 namespace asterism {
 
+// The first of n entries, sorted by their keys, whose key is not smaller. The search has no branch
+// that depends on the keys: the processor would predict every second one wrongly.
+template <typename Entry, typename Key, typename KeyOf>
+Entry first_from(Entry at, std::size_t n, const Key& key, KeyOf&& key_of) {
+  while (n > 0) {
+    const std::size_t half = n - n / 2;
+    at += static_cast<std::ptrdiff_t>((key_of(at[static_cast<std::ptrdiff_t>(half) - 1]) < key) * half);
+    n -= half;
+  }
+  return at;
+}
+
 template <typename Key, typename Value>
 class FlatMap {
  public:
@@ -54,16 +66,8 @@ class FlatMap {
   }
 
  private:
-  // The first entry whose key is not smaller. The search has no branch that depends on the keys:
-  // the processor would predict every second one wrongly.
   auto place_of(const Key& key) {
-    auto at = entries_.begin();
-    for (std::size_t n = entries_.size(); n > 0;) {
-      const std::size_t half = n - n / 2;
-      at += static_cast<std::ptrdiff_t>((at[static_cast<std::ptrdiff_t>(half) - 1].first < key) * half);
-      n -= half;
-    }
-    return at;
+    return first_from(entries_.begin(), entries_.size(), key, [](const Entry& e) { return e.first; });
   }
 
   std::vector<Entry> entries_;

@@ -41,7 +41,7 @@ class FrameTracker {
       begin_tracks(time, points);
     else if (live_.so_far.n_frames == 0)
       begin_strictly(time, points, label);
-    carried_.learn(live_, stats);
+    carried_.learn(live_);
     live_.count(stats);
     live_.so_far.add(time, points.size());
     total_.add(stats);

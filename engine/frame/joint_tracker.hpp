@@ -80,7 +80,7 @@ class JointTracker {
       label(live_.so_far.n_seen + static_cast<std::int64_t>(j), -1, s_.free[j] * p_clutter);
     update_tracks(time, points, stats, label);
     begin_tracks(time, points);
-    carried_.learn(live_, stats);
+    carried_.learn(live_);
     live_.count(stats);
     live_.so_far.add(time, points.size());
     total_.add(stats);

@@ -60,7 +60,7 @@ class HypothesisMatrix {
       weigh(1);
       prune_by_oldest();
       mash(stats, label);
-      open_.learn(stats);
+      open_.learn();
     }
     split();
   }

@@ -20,7 +20,6 @@ void bind_options(nb::module_& module) {
       .def_ro("n_confirmed", &FrameStats::n_confirmed)
       .def_ro("n_tentative", &FrameStats::n_tentative)
       .def_ro("n_pending", &FrameStats::n_pending)
-      .def_ro("n_bonds", &FrameStats::n_bonds)
       .def_ro("n_carried", &FrameStats::n_carried)
       .def_ro("n_returned", &FrameStats::n_returned)
       .def_ro("n_refused", &FrameStats::n_refused);

@@ -330,7 +330,14 @@ void bind_stitcher(nb::module_& module) {
           },
           "markers"_a, "points"_a)
       .def("carry", &carry, "marker"_a, "markers"_a, "points"_a)
-      .def("n_bonds", &RigidCarrier::n_bonds, "marker"_a)
+      .def(
+          "n_bonds",
+          [](const RigidCarrier& self, std::int32_t marker) {
+            std::int64_t n = 0;
+            for (const Bond& bond : self.distances(marker)) n += is_bond(bond, self.noise());
+            return n;
+          },
+          "marker"_a)
       .def("forget", &RigidCarrier::forget, "marker"_a);
   nb::class_<StitchOptions>(module, "StitchOptions")
       .def(nb::init<double, double, std::int64_t, std::int64_t, std::int64_t, bool>(),

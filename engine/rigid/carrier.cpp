@@ -65,12 +65,6 @@ bool RigidCarrier::carry(std::int32_t marker, const Places& now, Carriage& out,
   return true;
 }
 
-std::int64_t RigidCarrier::n_bonds(std::int32_t marker) const {
-  return std::ranges::count_if(carrier_.neighbours(marker), [&](const Bond& bond) {
-    return bond.other > marker && is_bond(bond, noise());
-  });
-}
-
 void RigidCarrier::mark_detected(std::int32_t marker) {
   const auto occlusion = occluded_.find(marker);
   if (occlusion == occluded_.end()) return;

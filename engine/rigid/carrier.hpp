@@ -212,8 +212,6 @@ class RigidCarrier {
 
   // All distances known of a marker, whether they are bonds or not.
   auto distances(std::int32_t marker) const { return carrier_.neighbours(marker); }
-  // The number of bonds of a marker to markers of larger number, so that each pair is counted once.
-  std::int64_t n_bonds(std::int32_t marker) const;
 
  private:
   struct Occlusion {

@@ -31,7 +31,8 @@ struct MarkerFrame {
   std::vector<MarkerPoint> seen;
 
   const Point* find(std::int32_t marker) const {
-    const auto at = std::ranges::lower_bound(seen, marker, {}, &MarkerPoint::marker);
+    const auto at =
+        first_from(seen.begin(), seen.size(), marker, [](const MarkerPoint& one) { return one.marker; });
     return at != seen.end() && at->marker == marker ? &at->at : nullptr;
   }
 };

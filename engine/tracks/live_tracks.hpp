@@ -74,7 +74,6 @@ struct FrameStats {
   std::int64_t n_candidates = 0, n_groups = 0, largest_group = 0;
   std::int64_t n_confirmed = 0, n_tentative = 0;  // at the end
   std::int64_t n_pending = 0;  // detections of tentative tracks at the end
-  std::int64_t n_bonds = 0;    // of markers, at the end
   // Occluded tracks predicted from neighbours, counted per frame; occluded tracks detected again;
   // detections refused because of neighbours.
   std::int64_t n_carried = 0, n_returned = 0, n_refused = 0;
@@ -84,7 +83,6 @@ struct FrameStats {
     n_confirmed = next.n_confirmed;
     n_tentative = next.n_tentative;
     n_pending = next.n_pending;
-    n_bonds = next.n_bonds;
   }
 
   // Adds the work done, without the state at the end.
@@ -208,11 +206,12 @@ class LiveTracks {
     });
   }
 
-  void predict_all(const MotionStep& step) {
-    s_.predictions.clear();
-    for (Track& track : tracks) {
-      predict(m, step, track.state);
-      s_.predictions.emplace_back(m, track.state);
+  // Predicts the tracks from number `first` on; those before are predicted already.
+  void predict_all(const MotionStep& step, std::size_t first = 0) {
+    s_.predictions.resize(first);
+    for (std::size_t i = first; i < tracks.size(); ++i) {
+      predict(m, step, tracks[i].state);
+      s_.predictions.emplace_back(m, tracks[i].state);
     }
   }
 

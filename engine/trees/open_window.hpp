@@ -71,8 +71,8 @@ struct OpenWindow {
   }
 
   // Updates the bonds after a decision.
-  void learn(TreeStats& stats) {
-    if (carrier.is_on()) carrier.learn(live, stats);
+  void learn() {
+    if (carrier.is_on()) carrier.learn(live);
   }
 
   // Updates the decided part of track i over the frame just popped, with detection `own` or, if

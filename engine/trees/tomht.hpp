@@ -57,7 +57,7 @@ class HypothesisForest {
     limit(stats);
     if (!open_.is_full()) return;
     decide(stats, label);
-    open_.learn(stats);
+    open_.learn();
   }
 
   template <typename Label>

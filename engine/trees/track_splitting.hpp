@@ -39,7 +39,7 @@ class Forest {
     open_.push(std::move(frame), stats);
     if (!open_.is_full()) return;
     decide(stats, label);
-    open_.learn(stats);
+    open_.learn();
   }
 
   // Decides all remaining frames from the data available.

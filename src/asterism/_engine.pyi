@@ -72,7 +72,6 @@ class FrameStats:
     n_confirmed: Final[int]
     n_tentative: Final[int]
     n_pending: Final[int]
-    n_bonds: Final[int]
     n_carried: Final[int]
     n_returned: Final[int]
     n_refused: Final[int]

@@ -143,8 +143,8 @@ def test_a_forgotten_marker_is_no_neighbour():
         engine.see(np.arange(7), points)
     before = sum(engine.n_bonds(k) for k in range(7))
     engine.forget(3)
-    assert before == 21
-    assert sum(engine.n_bonds(k) for k in range(7)) == 15
+    assert before == 7 * 6
+    assert sum(engine.n_bonds(k) for k in range(7)) == 6 * 5
 
 
 def walk_model(**changes):
@@ -216,8 +216,7 @@ def test_occluded_markers_of_a_person_come_back_as_themselves(make, seed):
     assert on.info["carried"] > 200
     assert on.info["returned"] > 5
     assert on.info["refused"] > 100
-    assert on.info["bonds"] > 100
-    assert not {"carried", "returned", "refused", "bonds"} & set(off.info)
+    assert not {"carried", "returned", "refused"} & set(off.info)
 
 
 @functools.cache

@@ -288,7 +288,6 @@ def shared_counts(options: SharedOptions, stats: _engine.FrameStats) -> dict[str
     }
     if options.rigid is not None:
         counts |= {
-            "bonds": stats.n_bonds,
             "carried": stats.n_carried,
             "returned": stats.n_returned,
             "refused": stats.n_refused,
