@@ -187,6 +187,15 @@ def test_the_bound_of_the_memory_is_kept(captures, tmp_path):
         assert "needs more memory than the bound of 0.06 GB" in reason or "SIGABRT" in reason
 
 
+def test_a_failed_capture_is_named_where_its_reason_is_not(tmp_path, capsys):
+    am.write(am.simulate.cube(frames=1, seed=1), tmp_path / "static.c3d")
+    source, out = str(tmp_path / "static.c3d"), str(tmp_path / "out")
+    assert main(["batch", source, "-o", out, "--workers", "1"]) == 1
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "static.c3d: detections: expected points in at least 3 frames" in printed
+    assert "found 8 in 1" in printed
+
+
 def test_the_memory_of_a_capture_is_its_own(captures, tmp_path):
     held = np.ones(60_000_000)  # of this process, which is not counted
     source = captures / "first" / "walk.c3d"

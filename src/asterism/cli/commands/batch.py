@@ -233,7 +233,7 @@ def _print(done: am.batch.Batch) -> None:
         rows += [("", line) for line in first_of(list(done.changed))]
         rows.append(("", "Give --overwrite to track them again, or another --out to keep both."))
     rows += [("failed", len(done.failed))] if done.failed else []
-    rows += [("", reason) for reason in done.failed.values()]
+    rows += [("", why if key in why else f"{key}: {why}") for key, why in done.failed.items()]
     rows += _left_out(done.left_out)
     took = [each for each in done.outcomes.values() if not each.error]
     if took:

@@ -131,8 +131,8 @@ def estimate_model(
     if detections.n_frames < 3 or detections.n_points < 3:
         raise ParameterError(
             "detections",
-            "at least 3 frames with points, to estimate a model from",
-            f"{detections.n_frames} frames with {detections.n_points} points",
+            "points in at least 3 frames, to estimate a model from",
+            f"{detections.n_points} in {detections.n_frames}",
             "give a model",
         )
     _check_units(detections)
