@@ -557,7 +557,7 @@ def test_json_holds_the_choice_and_auto_may_be_named(person, capsys):
 
 @pytest.fixture
 def walk_planned(monkeypatch):
-    """A walk, its recipe, and the ways of the attempts at it, which return `Planned` tracks."""
+    """A walk, its recipe, and the methods of its attempts, which return `Planned` tracks."""
     walk, made = am.simulate.person(activity="walk", frames=60, seed=1), []
 
     def planned(recipe, *_, **__):
@@ -567,26 +567,10 @@ def walk_planned(monkeypatch):
     monkeypatch.setattr(f"{MOST_CERTAIN}.attempt", planned)
     monkeypatch.setattr(f"{MOST_CERTAIN}.refined_by_own_distances", lambda found: found)
     monkeypatch.setattr(f"{MOST_CERTAIN}.assigned_again", lambda found: found)
-    monkeypatch.setattr(f"{MOST_CERTAIN}.has_many_rivals", lambda *_: False)
     monkeypatch.setattr(f"{MOST_CERTAIN}.choice_without_common_motion", lambda *_: None)
     shares = {"smp": 0.7, "tomht": 0.8, "bonds": 0.7, "gnn": 0.1}
     monkeypatch.setattr(Planned, "shares", shares)
     return walk, am.tracking.plan_tracking(walk.detections).recipe, made
-
-
-@pytest.mark.parametrize(
-    ("has_many_rivals", "share", "kept"),
-    [(False, 0.9, "tomht"), (True, 0.801, "tomht"), (True, 0.803, "mcmcda")],
-)
-def test_a_crowded_capture_is_searched_by_mcmcda_which_needs_a_margin(
-    has_many_rivals, share, kept, walk_planned, monkeypatch
-):
-    walk, recipe, made = walk_planned
-    monkeypatch.setitem(Planned.shares, "mcmcda", share)
-    monkeypatch.setattr(f"{MOST_CERTAIN}.has_many_rivals", lambda *_: has_many_rivals)
-    best = most_certain(recipe, walk.detections)
-    assert made == ["smp", "bonds", "tomht", "mcmcda"][: 4 if has_many_rivals else 3]
-    assert best.recipe.method == kept
 
 
 @pytest.mark.parametrize(
@@ -612,26 +596,9 @@ def test_the_motion_in_common_is_removed_from_bodies_that_are_more_certain_witho
     assert (best.still is not None) == is_kept
 
 
-@pytest.mark.parametrize("method", [am.GNN(), am.MCMCDA(moves=400)])
-def test_a_recipe_of_a_further_attempt_is_attempted_once(method, walk_planned, monkeypatch):
+def test_a_recipe_of_a_further_attempt_is_attempted_once(walk_planned):
     walk, recipe, made = walk_planned
-    monkeypatch.setattr(f"{MOST_CERTAIN}.has_many_rivals", lambda *_: True)
-    monkeypatch.setitem(Planned.shares, "mcmcda", 0.1)
     assert recipe.retry
-    kept = dataclasses.replace(recipe, method=method.name, options=options_of(method))
-    assert carried_out(kept, walk.detections).recipe.method == method.name
-    assert made == [method.name]
-
-
-def test_a_recipe_repeats_a_search_of_bodies(monkeypatch):
-    walk = am.simulate.person(activity="walk", frames=240, seed=11)
-    truth = am.simulate.corrupt(walk, missing=0.1, clutter=0.1, noise=3e-4, stride=4, seed=11)
-    monkeypatch.setattr(f"{MOST_CERTAIN}.has_many_rivals", lambda *_: True)
-    monkeypatch.setattr(f"{MOST_CERTAIN}._more_certain", lambda before, other, margin: other)
-    monkeypatch.setattr(DOUBTFUL, -1.0)
-    found = am.track(truth.detections)
-    assert (found.recipe.method, found.recipe.stitch) == ("mcmcda", True)
-    again = am.track(truth.detections, recipe=found.recipe)
-    assert again.recipe == found.recipe
-    np.testing.assert_array_equal(again.labels, found.labels)
-    np.testing.assert_array_equal(again.identity_confidence, found.identity_confidence)
+    kept = dataclasses.replace(recipe, method="gnn", options=options_of(am.GNN()))
+    assert carried_out(kept, walk.detections).recipe.method == "gnn"
+    assert made == ["gnn"]

@@ -33,7 +33,6 @@ __all__ = [
     "CONFUSED",
     "Choice",
     "choose_method",
-    "has_many_rivals",
     "quick_tracks",
 ]
 
@@ -59,8 +58,8 @@ CLEAR = 0.01
 
 CONFUSED = 1.0
 """Number of rival detections per link above which the tracks of GNN do not tell whether there are
-bodies, so that `fit_body_motion` does, `MCMCDA` searches longer, and markers without bodies are
-tried without the motion in common."""
+bodies, so that `fit_body_motion` does, `MCMCDA` searches until two searches agree, and markers
+without bodies are tried without the motion in common."""
 
 
 @record
@@ -195,19 +194,6 @@ def quick_tracks(detections: Detections, model: TrackingModel) -> tuple[Tracks, 
     tracks = Tracks(detections=detections, labels=labels)
     n_links = int(tracks.lengths.sum()) - tracks.n_tracks
     return tracks, max(state.info["candidates"] / max(n_links, 1) - 1, 0.0)
-
-
-def has_many_rivals(detections: Detections, model: TrackingModel) -> bool:
-    """Return whether links of a capture have more than `CONFUSED` rival detections.
-
-    Parameters
-    ----------
-    detections : Detections
-        Capture.
-    model : TrackingModel
-        Its model.
-    """
-    return quick_tracks(detections.measured(), model)[1] > CONFUSED
 
 
 def _bodies(tracks: Tracks, model: TrackingModel) -> Choice | None:

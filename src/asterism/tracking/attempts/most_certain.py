@@ -14,7 +14,6 @@ from asterism.tracking.attempts.attempt import attempt, next_pass
 from asterism.tracking.attempts.halves import Halves
 from asterism.tracking.attempts.own_distances import assigned_again, refined_by_own_distances
 from asterism.tracking.attempts.uncorrected import DOUBTFUL, Uncorrected
-from asterism.tracking.choose import has_many_rivals
 from asterism.tracking.estimation import (
     OVER_THREE_FRAMES,
     fit_body_motion,
@@ -33,8 +32,6 @@ __all__ = ["carried_out", "most_certain"]
 
 MAX_PASSES = 4
 """Largest number of passes over the capture."""
-SEARCH = MCMCDA(moves=400)
-"""Method of a longer search where links have many rivals."""
 
 
 def carried_out(
@@ -78,9 +75,8 @@ def most_certain(
     Then further passes follow (`next_pass`), until one is not more certain. The best is
     `assigned_again`. If it has bonds and identities are still uncertain, so is an attempt with the
     motion in tracks of single frames, and the more certain of both is the result. If that is still
-    uncertain, and links have many rivals (`has_many_rivals`), there is an attempt by `MCMCDA`.
-    Then, where detections are more probable without the motion that most markers have in common,
-    all this is done without it. Both must be more certain by `DOUBTFUL`. For `progress`, the first
+    uncertain, and detections are more probable without the motion that most markers have in common,
+    all this is done without it, which must be more certain by `DOUBTFUL`. For `progress`, the first
     method is half of the work, and every other attempt or pass half of what is left.
 
     Parameters
@@ -110,9 +106,6 @@ def most_certain(
             best = _more_certain(best, assigned_again(bodies), 0)
     else:
         best = assigned_again(refined_by_own_distances(first))
-    if best.is_doubtful and is_first and has_many_rivals(detections, recipe.model):
-        searched = refined_by_own_distances(_by(SEARCH, recipe, detections, parts.next()))
-        best = _more_certain(best, _with_reason(assigned_again(searched), first), margin)
     if best.is_doubtful and is_first and not recipe.common_motion:
         still = _attempt_without_common_motion(recipe, detections, parts.next())
         if still is not None:
@@ -158,8 +151,9 @@ def _attempt_without_common_motion(
     """
     choice = choice_without_common_motion(detections, recipe.model)
     # Bodies are still bodies then, and confidence from their distances is comparable.
-    if choice is None or choice.estimate is None or not choice.stitch:
+    if choice is None or not choice.stitch:
         return None
+    assert choice.estimate is not None
     other = dataclasses.replace(
         recipe, method=choice.method.name, options=options_of(choice.method),
         model=choice.estimate.model, reason=choice.reason, common_motion=True,
