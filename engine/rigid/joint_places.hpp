@@ -30,7 +30,7 @@ namespace asterism {
 
 class JointPlaces {
  public:
-  // A track: its marker, which no other track has, and the prediction of its next detection.
+  // A track: its marker, and the prediction of its next detection.
   struct Track {
     std::int32_t row = 0, marker = 0;
     Point center{};
@@ -48,15 +48,26 @@ class JointPlaces {
     numbers_.clear();
     for (std::int32_t a = 0; a < static_cast<std::int32_t>(tracks_.size()); ++a) {
       at_row_[tracks_[a].row] = a;
-      numbers_[tracks_[a].marker] = a;
+      numbers_.push_back({tracks_[a].marker, a});
     }
-    links_.clear();
-    of_track_.resize(std::max(of_track_.size(), tracks_.size()));
-    for (std::vector<std::int32_t>& links : of_track_) links.clear();
+    std::ranges::sort(numbers_);
+    known_.clear();
     for (std::int32_t a = 0; a < static_cast<std::int32_t>(tracks_.size()); ++a) {
       near_.clear();
       for (const Bond& bond : bonds_of(tracks_[a].marker)) add_known(a, bond);
-      for (const Known& one : near_) add_link(one);
+      known_.insert(known_.end(), near_.begin(), near_.end());
+    }
+    // A pair may be listed by both of its markers.
+    std::ranges::sort(known_, {}, [](const Known& one) { return std::tuple(one.a, one.b, one.V); });
+    const auto same = [](const Known& x, const Known& y) { return x.a == y.a && x.b == y.b; };
+    known_.erase(std::ranges::unique(known_, same).begin(), known_.end());
+    links_.clear();
+    of_track_.resize(std::max(of_track_.size(), tracks_.size()));
+    for (std::vector<std::int32_t>& links : of_track_) links.clear();
+    for (const Known& one : known_) {
+      for (const std::int32_t end : {one.a, one.b})
+        of_track_[end].push_back(static_cast<std::int32_t>(links_.size()));
+      links_.push_back({one, ratio(one)});
     }
     place_.assign(tracks_.size(), nullptr);
   }
@@ -88,17 +99,16 @@ class JointPlaces {
     const std::int32_t a = at_row_[row];
     return a == kNone ? nullptr : place_[a];
   }
-  // Sum of p over the bonds of a marker to others that have a place, for a detection at `y` and a
-  // prediction of the marker, which may differ from the one that was decided with. All bonds of a
-  // marker may break at once, so that the sum has the bound of one bond.
-  double gain(const Track& own, const Point& y) const {
-    const std::int32_t a = find(own.marker);
+  // Sum of p over the bonds of a row's track to others that have a place, for a detection at `y`.
+  // All bonds of a marker may break at once, so that the sum has the bound of one bond.
+  double gain(std::size_t row, const Point& y) const {
+    const std::int32_t a = at_row_[row];
     double sum = 0;
     if (a == kNone) return sum;
     for (const std::int32_t e : of_track_[a]) {
       const Link& link = links_[e];
-      const std::int32_t b = link.a == a ? link.b : link.a;
-      if (place_[b] != nullptr) sum += effect(link, ratio(link, own, tracks_[b]), *place_[b], y);
+      const Point* other = place_[link.a == a ? link.b : link.a];
+      if (other != nullptr) sum += effect(link, *other, y);
     }
     return std::clamp(sum, kLeast, kMost);
   }
@@ -128,24 +138,14 @@ class JointPlaces {
     }
   };
   struct Link : Known {
+    double ratio = 0;
     std::size_t effects = 0, to_a = 0, to_b = 0;  // where those begin in the arrays of a frame
   };
 
   std::int32_t find(std::int32_t marker) const {
-    const std::int32_t* a = numbers_.find(marker);
-    return a == nullptr ? kNone : *a;
-  }
-  // Adds a distance as a link. Where both markers list a pair, the steadier distance is used.
-  void add_link(const Known& one) {
-    for (const std::int32_t e : of_track_[one.a]) {
-      Known& same = links_[e];
-      if (same.b != one.b || same.a != one.a) continue;
-      same = std::min(same, one);
-      return;
-    }
-    for (const std::int32_t end : {one.a, one.b})
-      of_track_[end].push_back(static_cast<std::int32_t>(links_.size()));
-    links_.push_back({one});
+    const auto at = first_from(numbers_.begin(), numbers_.size(), marker,
+                               [](const auto& number) { return number.first; });
+    return at != numbers_.end() && at->first == marker ? at->second : kNone;
   }
   // Adds a bond of track a to `near_` if it is among the kMaxLinks steadiest. The other marker is
   // looked up last, because most bonds are refused before.
@@ -161,8 +161,9 @@ class JointPlaces {
   double distance(const Point& x, const Point& y) const {
     return std::sqrt(squared_distance(x, y, D_));
   }
-  // The square of the likelihood ratio of the bond's own distance, for the predictions of its tracks.
-  double ratio(const Known& one, const Track& a, const Track& b) const {
+  // The square of the likelihood ratio of the bond's own distance.
+  double ratio(const Known& one) const {
+    const Track &a = tracks_[one.a], &b = tracks_[one.b];
     const double spread = one.V + a.variance + b.variance;
     return spread / one.V * tail(distance(a.center, b.center) - one.distance, spread);
   }
@@ -172,8 +173,8 @@ class JointPlaces {
     return base * base * base * base * base;
   }
   // Most pairs of detections have an effect at a bound, for which no logarithm is needed.
-  double effect(const Known& link, double ratio, const Point& x, const Point& y) const {
-    const double squared = ratio / tail(distance(x, y) - link.distance, link.V);
+  double effect(const Link& link, const Point& x, const Point& y) const {
+    const double squared = link.ratio / tail(distance(x, y) - link.distance, link.V);
     if (squared <= kLeastSquared) return kLeast;
     if (squared >= kMostSquared) return kMost;
     return 0.5 * logarithm(squared);
@@ -184,7 +185,6 @@ class JointPlaces {
     effects_.clear();
     std::size_t n = 0;
     for (Link& link : links_) {
-      const double of_both = ratio(link, tracks_[link.a], tracks_[link.b]);
       link.effects = effects_.size();
       link.to_a = n;
       link.to_b = n += n_of(link.a);
@@ -192,8 +192,7 @@ class JointPlaces {
       for (std::size_t j = first_[link.a]; j < first_[link.a + 1]; ++j)
         for (std::size_t l = first_[link.b]; l < first_[link.b + 1]; ++l) {
           const std::int32_t own = candidates[j].column, other = candidates[l].column;
-          effects_.push_back(own == other ? -kMaxMessage
-                                          : effect(link, of_both, points[own], points[other]));
+          effects_.push_back(own == other ? -kMaxMessage : effect(link, points[own], points[other]));
         }
     }
     messages_.assign(n, 0);
@@ -239,8 +238,8 @@ class JointPlaces {
   int D_ = 3;
   std::vector<Track> tracks_;
   std::vector<std::int32_t> at_row_, order_;
-  FlatMap<std::int32_t, std::int32_t> numbers_;  // tracks of the markers
-  std::vector<Known> near_;
+  std::vector<std::pair<std::int32_t, std::int32_t>> numbers_;  // markers and their tracks
+  std::vector<Known> known_, near_;
   std::vector<Link> links_;
   std::vector<std::vector<std::int32_t>> of_track_;
   std::vector<std::size_t> first_;  // candidate of each track

@@ -42,38 +42,24 @@ class CarriedTracks {
   CarriedTracks(const MotionModel& m, const ScoreModel& score, const CarryOptions& options)
       : opt_(options), max_gap_(score.max_gap), carrier_(m.axis.D, m.axis.r) {}
 
-  // Predicts every track to a frame and lists its candidates (see LiveTracks::list).
+  // Predicts every track to a frame and lists its candidates (see LiveTracks::list). The last
+  // `n_open` frames before it have not been passed to `learn`.
   template <typename MinLogLikelihood, typename Gain>
   void list(LiveTracks<>& live, double time, const MotionStep& step, std::span<const Point> points,
             double min_gain, MinLogLikelihood&& min_log_likelihood, Gain&& gain,
-            std::vector<Candidate>& out, FrameStats& stats) {
-    list(live, time, step, points, min_gain, min_log_likelihood, gain, out, stats, 0,
-         [](std::size_t) {});
-  }
-  // The same for tracks with alternatives. The last `n_open` frames before this one have not been
-  // passed to `learn`. add_alternative(i) may add a row for track i in which its last detection is
-  // missed; it is called for the tracks that had a detection then and have no position now.
-  template <typename MinLogLikelihood, typename Gain, typename AddAlternative>
-  void list(LiveTracks<>& live, double time, const MotionStep& step, std::span<const Point> points,
-            double min_gain, MinLogLikelihood&& min_log_likelihood, Gain&& gain,
-            std::vector<Candidate>& out, FrameStats& stats, std::int64_t n_open,
-            AddAlternative&& add_alternative) {
+            std::vector<Candidate>& out, FrameStats& stats, std::int64_t n_open = 0) {
     live.predict_all(step);
     out.clear();
     // Bonds can raise a gain, so the threshold is lowered.
     const auto list = [&](auto&& is_selected, std::vector<Candidate>& to) {
-      live.list(time, points, opt_.is_on ? min_gain - kReach : min_gain, is_selected,
-                min_log_likelihood, gain, to);
+      live.list(time, points, opt_.is_on ? min_gain - kReach : min_gain, is_selected, min_log_likelihood, gain,
+                to);
     };
     if (!opt_.is_on) return list([](std::size_t) { return true; }, out);
     list([&](std::size_t i) { return live[i].gap == 0; }, out);
     s_.all = out;
     list([&](std::size_t i) { return live[i].gap > 0; }, s_.all);
     fix_positions(live, points);
-    const std::size_t n = live.size();
-    for (std::size_t i = 0; i < n; ++i)
-      if (live[i].gap == 0 && live[i].is_confirmed() && s_.joint.place(i) == nullptr) add_alternative(i);
-    live.predict_all(step, n);
     predict_occluded(live, n_open);
     s_.alone.clear();
     list([&](std::size_t i) { return s_.is_carried[i] != 0; }, s_.alone);
@@ -153,16 +139,15 @@ class CarriedTracks {
     return static_cast<std::int32_t>(track.id);
   }
 
-  static JointPlaces::Track expected(const LiveTracks<>& live, std::size_t i, const Prediction& own) {
-    return {static_cast<std::int32_t>(i), number(live[i]), own.center, own.variance()};
-  }
-
   // Decides jointly where the confirmed tracks are.
   void fix_positions(const LiveTracks<>& live, std::span<const Point> points) {
     s_.tracks.clear();
-    for (std::size_t i = 0; i < live.size(); ++i)
-      if (live[i].is_confirmed())
-        s_.tracks.push_back(expected(live, i, live.prediction(i)));
+    for (std::size_t i = 0; i < live.size(); ++i) {
+      if (!live[i].is_confirmed()) continue;
+      const Prediction& prediction = live.prediction(i);
+      s_.tracks.push_back({static_cast<std::int32_t>(i), number(live[i]), prediction.center,
+                           prediction.variance()});
+    }
     s_.joint.begin(s_.tracks, live.size(), carrier_.n_axes(),
                    [&](std::int32_t marker) { return carrier_.distances(marker); });
     std::erase_if(s_.all, [&](const Candidate& c) { return !live[c.row].is_confirmed(); });
@@ -244,9 +229,7 @@ class CarriedTracks {
       if (!live[c.row].is_confirmed()) continue;
       const bool was_listed = c.gain > min_gain;
       if (is_ambiguous(c)) {
-        const Prediction& own = is_carried(c.row) ? s_.own[c.row] : live.prediction(c.row);
-        const double nats = s_.joint.gain(expected(live, c.row, own), points[c.column]);
-        s_.bond_gains.push_back({c.row, c.column, nats});
+        s_.bond_gains.push_back({c.row, c.column, s_.joint.gain(c.row, points[c.column])});
         c.gain += s_.bond_gains.back().nats;
       }
       if (is_carried(c.row) && (!(c.gain > s_.ghosts[c.row]) || !may_take(live, c))) c.gain = kNever;

@@ -106,8 +106,8 @@ def test_no_method_is_the_one_that_was_chosen():
 @pytest.fixture(scope="module")
 def fast():
     """A walk at a quarter of the rate, in which SMP exchanges markers, and its tracks."""
-    walk = am.simulate.person(activity="walk", frames=300, seed=15)
-    truth = am.simulate.corrupt(walk, missing=0.1, clutter=0.1, noise=3e-4, stride=4, seed=15)
+    walk = am.simulate.person(activity="walk", frames=300, seed=11)
+    truth = am.simulate.corrupt(walk, missing=0.1, clutter=0.1, noise=3e-4, stride=4, seed=11)
     return truth, am.track(truth.detections)
 
 
