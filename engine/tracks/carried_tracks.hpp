@@ -3,8 +3,9 @@
 //
 // In each frame, after prediction and before association:
 //
-//   1  All tracks are gated by their own predictions. Bonds decide jointly which detections they
-//      have in this frame (rigid/joint_places.hpp), which fixes the positions of their markers.
+//   1  All tracks are gated by their own predictions; those without a clear candidate may have an
+//      alternative. Bonds decide jointly which detections they have in this frame
+//      (rigid/joint_places.hpp), which fixes the positions of their markers.
 //   2  Occluded tracks are predicted from these positions. The predicted position is fused with the
 //      track's own prediction (rigid/carried_state.hpp).
 //   3  Occluded tracks are gated by the fused or by their own prediction, whichever gives the
@@ -42,23 +43,39 @@ class CarriedTracks {
   CarriedTracks(const MotionModel& m, const ScoreModel& score, const CarryOptions& options)
       : opt_(options), max_gap_(score.max_gap), carrier_(m.axis.D, m.axis.r) {}
 
-  // Predicts every track to a frame and lists its candidates (see LiveTracks::list). The last
-  // `n_open` frames before it have not been passed to `learn`.
+  // Predicts every track to a frame and lists its candidates (see LiveTracks::list).
   template <typename MinLogLikelihood, typename Gain>
   void list(LiveTracks<>& live, double time, const MotionStep& step, std::span<const Point> points,
             double min_gain, MinLogLikelihood&& min_log_likelihood, Gain&& gain,
-            std::vector<Candidate>& out, FrameStats& stats, std::int64_t n_open = 0) {
+            std::vector<Candidate>& out, FrameStats& stats) {
+    list(live, time, step, points, min_gain, min_log_likelihood, gain, out, stats, 0,
+         [](std::size_t) {});
+  }
+  // The same for tracks with alternatives. The last `n_open` frames before this one have not been
+  // passed to `learn`. add_alternative(i) may add a row in which the last detection of track i is
+  // missed; it is called for the tracks that were detected then and have no clear candidate now.
+  template <typename MinLogLikelihood, typename Gain, typename AddAlternative>
+  void list(LiveTracks<>& live, double time, const MotionStep& step, std::span<const Point> points,
+            double min_gain, MinLogLikelihood&& min_log_likelihood, Gain&& gain,
+            std::vector<Candidate>& out, FrameStats& stats, std::int64_t n_open,
+            AddAlternative&& add_alternative) {
     live.predict_all(step);
     out.clear();
     // Bonds can raise a gain, so the threshold is lowered.
     const auto list = [&](auto&& is_selected, std::vector<Candidate>& to) {
-      live.list(time, points, opt_.is_on ? min_gain - kReach : min_gain, is_selected, min_log_likelihood, gain,
-                to);
+      live.list(time, points, opt_.is_on ? min_gain - kReach : min_gain, is_selected,
+                min_log_likelihood, gain, to);
     };
     if (!opt_.is_on) return list([](std::size_t) { return true; }, out);
     list([&](std::size_t i) { return live[i].gap == 0; }, out);
     s_.all = out;
     list([&](std::size_t i) { return live[i].gap > 0; }, s_.all);
+    find_clear(live, points, min_gain);
+    const std::size_t n = live.size();
+    for (std::size_t i = 0; i < n; ++i)
+      if (live[i].gap == 0 && live[i].is_confirmed() && !s_.is_clear[i]) add_alternative(i);
+    live.predict_all(step, n);
+    list([&](std::size_t i) { return i >= n; }, s_.all);
     fix_positions(live, points);
     predict_occluded(live, n_open);
     s_.alone.clear();
@@ -139,6 +156,25 @@ class CarriedTracks {
     return static_cast<std::int32_t>(track.id);
   }
 
+  // Counts the tracks of each detection and the detections of each track among candidates.
+  void count_rivals(std::span<const Candidate> all, std::size_t n_tracks, std::size_t n_points) {
+    s_.n_rows.assign(n_points, 0);
+    s_.n_columns.assign(n_tracks, 0);
+    for (const Candidate& c : all) {
+      ++s_.n_rows[c.column];
+      ++s_.n_columns[c.row];
+    }
+  }
+  bool is_ambiguous(const Candidate& c, double min_gain) const {
+    return s_.n_rows[c.column] > 1 || s_.n_columns[c.row] > 1 || c.gain - kReach <= min_gain;
+  }
+  // Finds the tracks with a clear candidate, which has no rivals and a high gain.
+  void find_clear(const LiveTracks<>& live, std::span<const Point> points, double min_gain) {
+    count_rivals(s_.all, live.size(), points.size());
+    s_.is_clear.assign(live.size(), 0);
+    for (const Candidate& c : s_.all) s_.is_clear[c.row] = !is_ambiguous(c, min_gain);
+  }
+
   // Decides jointly where the confirmed tracks are.
   void fix_positions(const LiveTracks<>& live, std::span<const Point> points) {
     s_.tracks.clear();
@@ -214,21 +250,12 @@ class CarriedTracks {
   // Applies ghosts and bonds to the gains of the candidates.
   void weigh(const LiveTracks<>& live, std::span<const Point> points, double min_gain,
              std::vector<Candidate>& out, FrameStats& stats) {
-    s_.n_rows.assign(points.size(), 0);
-    s_.n_columns.assign(live.size(), 0);
-    for (const Candidate& c : out) {
-      ++s_.n_rows[c.column];
-      ++s_.n_columns[c.row];
-    }
-    const auto is_ambiguous = [&](const Candidate& c) {
-      return s_.n_rows[c.column] > 1 || s_.n_columns[c.row] > 1 ||
-             c.gain - kReach <= min_gain;
-    };
+    count_rivals(out, live.size(), points.size());
     s_.bond_gains.clear();
     for (Candidate& c : out) {
       if (!live[c.row].is_confirmed()) continue;
       const bool was_listed = c.gain > min_gain;
-      if (is_ambiguous(c)) {
+      if (is_ambiguous(c, min_gain)) {
         s_.bond_gains.push_back({c.row, c.column, s_.joint.gain(c.row, points[c.column])});
         c.gain += s_.bond_gains.back().nats;
       }
@@ -266,7 +293,7 @@ class CarriedTracks {
   }
 
   struct Memory {
-    std::vector<char> is_carried, is_uncertain;
+    std::vector<char> is_carried, is_uncertain, is_clear;
     std::vector<Carried> place;
     std::vector<BondGain> bond_gains;
     std::vector<MotionState> fused;
