@@ -292,3 +292,19 @@ def test_what_is_no_tracks_is_refused():
         am.stitch(truth.detections, model)
     with pytest.raises(am.ParameterError, match="estimate_model"):
         am.stitch(truth, 3)
+
+
+@pytest.mark.parametrize("n_seen", [70, 110])
+def test_a_marker_that_its_neighbours_contradict_again_and_again_is_kept(n_seen):
+    body, times = np.random.default_rng(1).uniform(-0.15, 0.15, (8, 3)), np.arange(200) / 25
+    turn = Rotation.from_euler("z", 0.5 * np.sin(2 * times)[:, None])
+    dense = np.stack([turn.apply(p) for p in body], axis=1)
+    dense[:, 0, 2] += 0.03 * (np.arange(200) // 9 % 2)  # skin that slides to and fro
+    dense[n_seen:, 0] = np.nan
+    dense += np.random.default_rng(2).normal(scale=3e-4, size=dense.shape)
+    tracks = am.Tracks.from_dense(times, dense)
+    found = am.stitch(tracks, am.estimate_model(tracks.detections).model)
+    assert len(found.cuts) > 3
+    assert found.tracks.n_tracks == 8
+    assert len(found.joins) == len(found.cuts)
+    assert (am.evaluate(found.tracks, tracks).idf1, len(found.ghosts)) == (1, 0)
