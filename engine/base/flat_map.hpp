@@ -13,8 +13,8 @@ namespace asterism {
 
 // The first of n entries, sorted by their keys, whose key is not smaller. The search has no branch
 // that depends on the keys: the processor would predict every second one wrongly.
-template <typename Entry, typename Key, typename KeyOf>
-Entry first_from(Entry at, std::size_t n, const Key& key, KeyOf&& key_of) {
+template <typename Iterator, typename Key, typename KeyOf>
+Iterator first_from(Iterator at, std::size_t n, const Key& key, KeyOf&& key_of) {
   while (n > 0) {
     const std::size_t half = n - n / 2;
     at += static_cast<std::ptrdiff_t>((key_of(at[static_cast<std::ptrdiff_t>(half) - 1]) < key) * half);

@@ -187,13 +187,16 @@ def test_the_bound_of_the_memory_is_kept(captures, tmp_path):
         assert "needs more memory than the bound of 0.06 GB" in reason or "SIGABRT" in reason
 
 
-def test_a_failed_capture_is_named_where_its_reason_is_not(tmp_path, capsys):
-    am.write(am.simulate.cube(frames=1, seed=1), tmp_path / "static.c3d")
-    source, out = str(tmp_path / "static.c3d"), str(tmp_path / "out")
-    assert main(["batch", source, "-o", out, "--workers", "1"]) == 1
+def test_a_failed_capture_is_named_once(tmp_path, capsys):
+    captures = tmp_path / "captures"
+    captures.mkdir()
+    am.write(am.simulate.cube(frames=1, seed=1), captures / "static.c3d")
+    (captures / "damaged.c3d").write_bytes((captures / "static.c3d").read_bytes()[:600])
+    assert main(["batch", str(captures), "-o", str(tmp_path / "out"), "--workers", "1"]) == 1
     printed = " ".join(capsys.readouterr().out.split())
-    assert "static.c3d: detections: expected points in at least 3 frames" in printed
-    assert "found 8 in 1" in printed
+    assert "static.c3d: detections: expected at least 3 points in at least 3 frames" in printed
+    assert "found 8 points in 1 frame" in printed
+    assert (printed.count("static.c3d"), printed.count("damaged.c3d")) == (1, 1)
 
 
 def test_the_memory_of_a_capture_is_its_own(captures, tmp_path):

@@ -51,13 +51,13 @@ def carried_out(
         `METHODS` and no initial tracks.
     """
     still = without_common_motion(detections) if recipe.common_motion else None
-    modelled = detections if still is None else still
+    tracked = detections if still is None else still
     if not recipe.retry:
-        found = attempt(recipe, modelled, method, start=start, progress=progress)
+        found = attempt(recipe, tracked, method, start=start, progress=progress)
     elif recipe.method == MCMCDA.name and not recipe.stitch:
-        found = until_agreed(recipe, modelled, progress)
+        found = until_agreed(recipe, tracked, progress)
     else:
-        found = most_certain(recipe, modelled, progress)
+        found = most_certain(recipe, tracked, progress)
     if still is None:
         return found
     tracks = dataclasses.replace(found.tracks, detections=detections.measured())

@@ -129,10 +129,11 @@ def estimate_model(
     check_kind("detections", detections, Detections, "am.Detections.from_frames, or am.read")
     detections = detections.measured()
     if detections.n_frames < 3 or detections.n_points < 3:
+        frames = "1 frame" if detections.n_frames == 1 else f"{detections.n_frames} frames"
         raise ParameterError(
             "detections",
-            "points in at least 3 frames, to estimate a model from",
-            f"{detections.n_points} in {detections.n_frames}",
+            "at least 3 points in at least 3 frames, to estimate a model from",
+            f"{detections.n_points} points in {frames}",
             "give a model",
         )
     _check_units(detections)
