@@ -17,7 +17,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "base/flat_map.hpp"
@@ -38,7 +38,7 @@ class JointPlaces {
   };
 
   // Begins a frame, with tracks ordered by row. `bonds_of(marker)` are the distances known of a
-  // marker, by increasing variance.
+  // marker, by increasing predictive variance.
   template <typename BondsOf>
   void begin(std::span<const Track> tracks, std::size_t n_rows, int D,
              BondsOf&& bonds_of) {
@@ -56,8 +56,10 @@ class JointPlaces {
     for (std::vector<std::int32_t>& links : of_track_) links.clear();
     for (std::int32_t a = 0; a < static_cast<std::int32_t>(tracks_.size()); ++a) {
       std::size_t n = 0;
-      for (const Bond& bond : bonds_of(tracks_[a].marker))
-        if (n < kMaxLinks) n += add_link(a, bond);
+      for (const Bond& bond : bonds_of(tracks_[a].marker)) {
+        n += add_link(a, bond);
+        if (n == kMaxLinks) break;
+      }
     }
     for (Link& link : links_) link.ratio = ratio(link);
     place_.assign(tracks_.size(), nullptr);
@@ -120,7 +122,8 @@ class JointPlaces {
   static constexpr double kMaxMessage = 20;
   static constexpr double kFreedom = 4;
 
-  // A distance between two tracks, a < b, and the square of its likelihood ratio.
+  // A distance between two tracks, a < b, and the square of the factor of its effect that does not
+  // depend on detections.
   struct Link {
     std::int32_t a = 0, b = 0;
     double distance = 0, V = 0;

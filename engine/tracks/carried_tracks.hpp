@@ -3,8 +3,8 @@
 //
 // In each frame, after prediction and before association:
 //
-//   1  All tracks are gated by their own predictions; those without a clear candidate may have an
-//      alternative. Bonds decide jointly which detections they have in this frame
+//   1  All tracks are gated by their own predictions. Those detected in the last frame that have no
+//      clear candidate now may have an alternative, in which that detection is missed. Bonds decide jointly which detections they have in this frame
 //      (rigid/joint_places.hpp), which fixes the positions of their markers.
 //   2  Occluded tracks are predicted from these positions. The predicted position is fused with the
 //      track's own prediction (rigid/carried_state.hpp).
@@ -23,6 +23,7 @@
 #include <numbers>
 #include <optional>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "base/scratch.hpp"
@@ -43,22 +44,16 @@ class CarriedTracks {
   CarriedTracks(const MotionModel& m, const ScoreModel& score, const CarryOptions& options)
       : opt_(options), max_gap_(score.max_gap), carrier_(m.axis.D, m.axis.r) {}
 
-  // Predicts every track to a frame and lists its candidates (see LiveTracks::list).
-  template <typename MinLogLikelihood, typename Gain>
+  struct NoAlternatives {};
+  // Predicts every track to a frame and lists its candidates (see LiveTracks::list). The last
+  // `n_open` frames before it have not been passed to `learn`. add_alternative(i) may add a row in
+  // which the last detection of track i is missed; it is called for the tracks that were detected
+  // then and have no clear candidate now.
+  template <typename MinLogLikelihood, typename Gain, typename AddAlternative = NoAlternatives>
   void list(LiveTracks<>& live, double time, const MotionStep& step, std::span<const Point> points,
             double min_gain, MinLogLikelihood&& min_log_likelihood, Gain&& gain,
-            std::vector<Candidate>& out, FrameStats& stats) {
-    list(live, time, step, points, min_gain, min_log_likelihood, gain, out, stats, 0,
-         [](std::size_t) {});
-  }
-  // The same for tracks with alternatives. The last `n_open` frames before this one have not been
-  // passed to `learn`. add_alternative(i) may add a row in which the last detection of track i is
-  // missed; it is called for the tracks that were detected then and have no clear candidate now.
-  template <typename MinLogLikelihood, typename Gain, typename AddAlternative>
-  void list(LiveTracks<>& live, double time, const MotionStep& step, std::span<const Point> points,
-            double min_gain, MinLogLikelihood&& min_log_likelihood, Gain&& gain,
-            std::vector<Candidate>& out, FrameStats& stats, std::int64_t n_open,
-            AddAlternative&& add_alternative) {
+            std::vector<Candidate>& out, FrameStats& stats, std::int64_t n_open = 0,
+            [[maybe_unused]] const AddAlternative& add_alternative = {}) {
     live.predict_all(step);
     out.clear();
     // Bonds can raise a gain, so the threshold is lowered.
@@ -70,12 +65,14 @@ class CarriedTracks {
     list([&](std::size_t i) { return live[i].gap == 0; }, out);
     s_.all = out;
     list([&](std::size_t i) { return live[i].gap > 0; }, s_.all);
-    find_clear(live, points, min_gain);
-    const std::size_t n = live.size();
-    for (std::size_t i = 0; i < n; ++i)
-      if (live[i].gap == 0 && live[i].is_confirmed() && !s_.is_clear[i]) add_alternative(i);
-    live.predict_all(step, n);
-    list([&](std::size_t i) { return i >= n; }, s_.all);
+    if constexpr (!std::is_same_v<AddAlternative, NoAlternatives>) {
+      find_clear(live, points, min_gain);
+      const std::size_t n = live.size();
+      for (std::size_t i = 0; i < n; ++i)
+        if (live[i].gap == 0 && live[i].is_confirmed() && !s_.is_clear[i]) add_alternative(i);
+      live.predict_all(step, n);
+      list([&](std::size_t i) { return i >= n; }, s_.all);
+    }
     fix_positions(live, points);
     predict_occluded(live, n_open);
     s_.alone.clear();
@@ -168,7 +165,8 @@ class CarriedTracks {
   bool is_ambiguous(const Candidate& c, double min_gain) const {
     return s_.n_rows[c.column] > 1 || s_.n_columns[c.row] > 1 || c.gain - kReach <= min_gain;
   }
-  // Finds the tracks with a clear candidate, which has no rivals and a high gain.
+  // Finds the tracks with a clear candidate, which has a high gain and no rivals by the tracks' own
+  // predictions. Such a track may still follow a ghost.
   void find_clear(const LiveTracks<>& live, std::span<const Point> points, double min_gain) {
     count_rivals(s_.all, live.size(), points.size());
     s_.is_clear.assign(live.size(), 0);

@@ -31,8 +31,8 @@ class WindowCarrier {
 
   bool is_on() const { return all_.has_value(); }
 
-  // Adds the information on a frame that follows `n_open` undecided ones. Rows are the best branches
-  // and, for tracks without a clear candidate, an occluded one.
+  // Adds the information on a frame that follows `n_open` undecided ones. Rows are the best
+  // branches and, for tracks without a clear candidate, an occluded one.
   void advise(const LiveTracks<Tree>& live, std::int64_t n_open, WindowFrame& frame,
               FrameStats& stats) {
     auto& [rows, carried] = all_.own();
@@ -52,7 +52,7 @@ class WindowCarrier {
     for (std::size_t i = 0; i < rows.size(); ++i) {
       NeighbourAdvice& own = s_.advice[s_.place[i]];
       const std::int32_t replaced_by = carried.replaced_by(i);
-      own.is_reappearance = own.is_reappearance || (replaced_by >= 0 && std::cmp_less(replaced_by, n_best));
+      if (replaced_by >= 0 && std::cmp_less(replaced_by, n_best)) own.is_reappearance = true;
       if (!carried.is_carried(i)) continue;
       own.is_carried = true;
       own.is_uncertain = carried.is_uncertain(i);

@@ -294,17 +294,33 @@ def test_what_is_no_tracks_is_refused():
         am.stitch(truth, 3)
 
 
-@pytest.mark.parametrize("n_seen", [70, 110])
-def test_a_marker_that_its_neighbours_contradict_again_and_again_is_kept(n_seen):
+def sliding(seen):
+    """Seven markers of a body, and one on skin that slides to and fro, seen in some frames."""
     body, times = np.random.default_rng(1).uniform(-0.15, 0.15, (8, 3)), np.arange(200) / 25
     turn = Rotation.from_euler("z", 0.5 * np.sin(2 * times)[:, None])
     dense = np.stack([turn.apply(p) for p in body], axis=1)
-    dense[:, 0, 2] += 0.03 * (np.arange(200) // 9 % 2)  # skin that slides to and fro
-    dense[n_seen:, 0] = np.nan
+    dense[:, 0, 2] += 0.03 * (np.arange(200) // 9 % 2)
+    dense[~seen, 0] = np.nan
     dense += np.random.default_rng(2).normal(scale=3e-4, size=dense.shape)
     tracks = am.Tracks.from_dense(times, dense)
-    found = am.stitch(tracks, am.estimate_model(tracks.detections).model)
+    return tracks, am.estimate_model(tracks.detections).model
+
+
+@pytest.mark.parametrize(("n_seen", "n_tracks"), [(50, 7), (70, 8), (110, 8)])
+def test_a_marker_that_its_neighbours_contradict_again_and_again_is_no_ghost(n_seen, n_tracks):
+    tracks, model = sliding(np.arange(200) < n_seen)
+    found = am.stitch(tracks, model)
     assert len(found.cuts) > 3
-    assert found.tracks.n_tracks == 8
+    assert found.tracks.n_tracks == n_tracks
+    if n_tracks == 7:
+        assert not found.joins
+        return
     assert len(found.joins) == len(found.cuts)
+    assert {join.probability for join in found.joins} == {0.95}
     assert (am.evaluate(found.tracks, tracks).idf1, len(found.ghosts)) == (1, 0)
+
+
+def test_ghosts_before_and_after_a_long_gap_are_not_one_marker():
+    tracks, model = sliding((np.arange(200) < 50) | (np.arange(200) > 150))
+    model = am.tracking.tracklet_model(model)
+    assert am.stitch(tracks, model).tracks.n_tracks == 7

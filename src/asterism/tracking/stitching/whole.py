@@ -28,10 +28,11 @@ if TYPE_CHECKING:
 __all__ = ["Join", "Stitching", "check_options", "stitch", "stitch_options"]
 
 GHOST = -2
-LONGEST_GHOST = 4
-"""Longest ghost, in multiples of `confirm`: 39 frames on captures with simulated ghosts."""
+MAX_GHOST = 60
+"""Largest number of detections of a ghost. The longest track of ghosts had 39, on captures with
+simulated ghosts of up to 10 frames each."""
 KEPT = 0.95
-"""Probability of the joins within a track that is kept: all 10 were right on simulated people."""
+"""Probability of the joins of ghosts that are a marker. On simulated people 10 of 10 were right."""
 
 
 @record
@@ -170,8 +171,8 @@ def stitch(
     first.
 
     Three passes go through the capture, forward, backward and forward again; the joins of each
-    pass are prior information for the next. A track that is mostly ghosts, in more than four times
-    `confirm` frames, is kept as a marker. At the end two tracks are joined if they are in no
+    pass are prior information for the next. Ghosts that were cut from each other are a marker
+    if they have more than 60 detections. At the end two tracks are joined if they are in no
     frame together and keep the same distances to other tracks, bodies that left the view and came
     back are joined by the distances among their markers, and two tracks are exchanged where these
     distances show that they have each other's marker.
@@ -241,7 +242,7 @@ def stitch(
     found = go_through(d, found.tracklets, model, options, before=found, backward=True)
     options = stitch_options(*limits, may_cut=False)
     found = go_through(d, found.tracklets, model, options, before=found)
-    found = _without_long_ghosts(found, tracks, confirm)
+    found = _with_long_ghosts(found, tracks, model.population.max_gap)
     found = joined_by_distances(d, found, model.sensor.noise_sigma, max_occlusion)
     found = exchanged_by_distances(d, found, model)
     tracklets, markers, after = found.tracklets, found.markers, found.after
@@ -345,27 +346,31 @@ def _names(
     return tuple(names)
 
 
-def _without_long_ghosts(found: Pass, tracks: Tracks, confirm: int) -> Pass:
-    """Return a pass in which a track of ghosts is a marker if it is longer than ghosts are.
+def _with_long_ghosts(found: Pass, tracks: Tracks, max_gap: int) -> Pass:
+    """Return a pass in which long ghosts are markers: those that follow each other in a track.
 
     A marker that its neighbours contradict again and again is cut into tracklets that are short for
     that reason alone.
     """
-    at = np.flatnonzero(found.tracklets >= 0)
-    of_ghost = found.markers[found.tracklets[at]] == GHOST
-    track = tracks.labels[at]
-    n, n_ghosts = (
-        np.bincount(each, minlength=tracks.n_tracks) for each in (track, track[of_ghost])
+    order, _ = tracks.by_track
+    order = order[found.tracklets[order] >= 0]
+    own = found.tracklets[order]
+    is_ghost = found.markers[own] == GHOST
+    starts = np.ones(len(order), dtype=bool)
+    starts[1:] = (
+        (np.diff(tracks.labels[order]) != 0)
+        | (np.diff(is_ghost) != 0)
+        | (np.diff(tracks.detections.frame_of[order]) > max_gap + 1)
     )
-    is_marker = (n_ghosts > LONGEST_GHOST * confirm) & (2 * n_ghosts > n)
+    run = np.cumsum(starts)
     markers, after, probabilities = (
         each.copy() for each in (found.markers, found.after, found.probabilities)
     )
-    for each in np.flatnonzero(is_marker):
-        own = np.unique(found.tracklets[at[of_ghost & (track == each)]])  # numbered by their start
-        markers[own] = markers.max(initial=-1) + 1
-        after[own[1:]] = own[:-1]
-        probabilities[own] = KEPT
+    for each in np.flatnonzero(np.bincount(run[is_ghost]) > MAX_GHOST):
+        parts = np.unique(own[run == each])  # numbered by their start
+        markers[parts] = markers.max(initial=-1) + 1
+        after[parts[1:]] = parts[:-1]
+        probabilities[parts] = KEPT
     return replace(found, markers=markers, after=after, probabilities=probabilities)
 
 
