@@ -295,7 +295,7 @@ def test_what_is_no_tracks_is_refused():
 
 
 def sliding(seen):
-    """Seven markers of a body, and one on skin that slides to and fro, seen in some frames."""
+    """Seven markers of a body, and one on skin that slides back and forth, seen in some frames."""
     body, times = np.random.default_rng(1).uniform(-0.15, 0.15, (8, 3)), np.arange(200) / 25
     turn = Rotation.from_euler("z", 0.5 * np.sin(2 * times)[:, None])
     dense = np.stack([turn.apply(p) for p in body], axis=1)
