@@ -17,6 +17,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -38,7 +39,7 @@ class JointPlaces {
   };
 
   // Begins a frame, with tracks ordered by row. `bonds_of(marker)` are the distances known of a
-  // marker, by increasing predictive variance.
+  // marker.
   template <typename BondsOf>
   void begin(std::span<const Track> tracks, std::size_t n_rows, int D,
              BondsOf&& bonds_of) {
@@ -55,11 +56,9 @@ class JointPlaces {
     of_track_.resize(std::max(of_track_.size(), tracks_.size()));
     for (std::vector<std::int32_t>& links : of_track_) links.clear();
     for (std::int32_t a = 0; a < static_cast<std::int32_t>(tracks_.size()); ++a) {
-      std::size_t n = 0;
-      for (const Bond& bond : bonds_of(tracks_[a].marker)) {
-        n += add_link(a, bond);
-        if (n == kMaxLinks) break;
-      }
+      near_.clear();
+      for (const Bond& bond : bonds_of(tracks_[a].marker)) add_known(a, bond);
+      for (const Known& one : near_) add_link(one);
     }
     for (Link& link : links_) link.ratio = ratio(link);
     place_.assign(tracks_.size(), nullptr);
@@ -122,11 +121,15 @@ class JointPlaces {
   static constexpr double kMaxMessage = 20;
   static constexpr double kFreedom = 4;
 
-  // A distance between two tracks, a < b, and the square of the factor of its effect that does not
-  // depend on detections.
-  struct Link {
+  // A distance between two tracks, a < b.
+  struct Known {
     std::int32_t a = 0, b = 0;
     double distance = 0, V = 0;
+    bool operator<(const Known& other) const {
+      return std::tuple(V, a, b) < std::tuple(other.V, other.a, other.b);
+    }
+  };
+  struct Link : Known {
     double ratio = 0;
     std::size_t effects = 0, to_a = 0, to_b = 0;  // where those begin in the arrays of a frame
   };
@@ -136,33 +139,34 @@ class JointPlaces {
                                [](const auto& number) { return number.first; });
     return at != numbers_.end() && at->first == marker ? at->second : kNone;
   }
-  // Adds a bond of track a as a link if it is steady and its other marker has a track. Where both
-  // markers list a pair, the steadier distance is used.
-  bool add_link(std::int32_t own, const Bond& bond) {
-    if (bond.n < kMinFrames) return false;
+  // Adds a bond of track a to `near_` if it is among the kMaxLinks steadiest. The other marker is
+  // looked up last, because most bonds are refused before.
+  void add_known(std::int32_t a, const Bond& bond) {
+    if (bond.n < kMinFrames) return;
     const double n = static_cast<double>(std::min(bond.n, kMemory)), prior = kSteady * bond.mean;
     const double V = (n * bond.variance + prior * prior * kPriorFrames) / (n + kPriorFrames);
-    if (!(V < kMaxSpread * kMaxSpread * bond.mean * bond.mean)) return false;
-    const std::int32_t other = find(bond.other);
-    if (other == kNone) return false;
-    const std::int32_t a = std::min(own, other), b = std::max(own, other);
-    const auto same = std::ranges::find_if(of_track_[a], [&](std::int32_t e) {
-      return links_[e].a == a && links_[e].b == b;
-    });
-    if (same == of_track_[a].end()) {
-      for (const std::int32_t end : {a, b})
-        of_track_[end].push_back(static_cast<std::int32_t>(links_.size()));
-      links_.push_back({a, b, bond.mean, V});
-    } else if (V < links_[*same].V) {
-      links_[*same] = {a, b, bond.mean, V};
+    if (!(V < kMaxSpread * kMaxSpread * bond.mean * bond.mean)) return;
+    if (near_.size() == kMaxLinks && V > near_.back().V) return;
+    const std::int32_t b = find(bond.other);
+    if (b != kNone) keep_smallest(near_, kMaxLinks, {std::min(a, b), std::max(a, b), bond.mean, V});
+  }
+  // Adds a distance as a link. Where both markers list a pair, the steadier distance is used.
+  void add_link(const Known& one) {
+    for (const std::int32_t e : of_track_[one.a]) {
+      Known& same = links_[e];
+      if (same.a != one.a || same.b != one.b) continue;
+      same = std::min(same, one);
+      return;
     }
-    return true;
+    for (const std::int32_t end : {one.a, one.b})
+      of_track_[end].push_back(static_cast<std::int32_t>(links_.size()));
+    links_.push_back({one});
   }
   double distance(const Point& x, const Point& y) const {
     return std::sqrt(squared_distance(x, y, D_));
   }
   // The square of the likelihood ratio of the bond's own distance.
-  double ratio(const Link& link) const {
+  double ratio(const Known& link) const {
     const Track &a = tracks_[link.a], &b = tracks_[link.b];
     const double spread = link.V + a.variance + b.variance;
     return spread / link.V * tail(distance(a.center, b.center) - link.distance, spread);
@@ -239,6 +243,7 @@ class JointPlaces {
   std::vector<Track> tracks_;
   std::vector<std::int32_t> at_row_, order_;
   std::vector<std::pair<std::int32_t, std::int32_t>> numbers_;  // markers and their tracks
+  std::vector<Known> near_;
   std::vector<Link> links_;
   std::vector<std::vector<std::int32_t>> of_track_;
   std::vector<std::size_t> first_;  // candidate of each track

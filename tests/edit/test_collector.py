@@ -24,7 +24,7 @@ KEEP_DOWNLOADS = """
 
 @pytest.fixture(scope="module")
 def tracks(tmp_path_factory):
-    """The capture with its tracks, by a method that takes no time."""
+    """Tracks of the capture by GNN."""
     folder = tmp_path_factory.mktemp("tracks")
     write_capture(folder)
     return am.track(am.read(folder / CAPTURE), am.GNN())
