@@ -65,7 +65,8 @@ class CarriedTracks {
     list([&](std::size_t i) { return live[i].gap == 0; }, out);
     s_.all = out;
     list([&](std::size_t i) { return live[i].gap > 0; }, s_.all);
-    if constexpr (!std::is_same_v<AddAlternative, NoAlternatives>) {
+    constexpr bool has_alternatives = !std::is_same_v<AddAlternative, NoAlternatives>;
+    if constexpr (has_alternatives) {
       find_clear(live, points, min_gain);
       const std::size_t n = live.size();
       for (std::size_t i = 0; i < n; ++i)
@@ -86,7 +87,7 @@ class CarriedTracks {
     list([&](std::size_t i) { return live[i].gap > 0; }, out);
     std::ranges::stable_sort(out, {}, &Candidate::row);
     add_alone(out);
-    weigh(live, points, min_gain, out, stats);
+    weigh(live, points, min_gain, has_alternatives, out, stats);
     count_refused(min_gain, out, stats);
   }
 
@@ -245,15 +246,16 @@ class CarriedTracks {
     out.insert(out.end(), s_.added.begin(), s_.added.end());
     std::ranges::stable_sort(out, {}, &Candidate::row);
   }
-  // Applies ghosts and bonds to the gains of the candidates.
+  // Applies ghosts and bonds to the gains of the candidates. Where tracks have alternatives, bonds
+  // count for clear candidates too: they compare branches over several frames.
   void weigh(const LiveTracks<>& live, std::span<const Point> points, double min_gain,
-             std::vector<Candidate>& out, FrameStats& stats) {
+             bool has_alternatives, std::vector<Candidate>& out, FrameStats& stats) {
     count_rivals(out, live.size(), points.size());
     s_.bond_gains.clear();
     for (Candidate& c : out) {
       if (!live[c.row].is_confirmed()) continue;
       const bool was_listed = c.gain > min_gain;
-      if (is_ambiguous(c, min_gain)) {
+      if (has_alternatives || is_ambiguous(c, min_gain)) {
         s_.bond_gains.push_back({c.row, c.column, s_.joint.gain(c.row, points[c.column])});
         c.gain += s_.bond_gains.back().nats;
       }
