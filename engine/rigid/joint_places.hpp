@@ -18,7 +18,6 @@
 #include <cstdint>
 #include <span>
 #include <tuple>
-#include <utility>
 #include <vector>
 
 #include "base/flat_map.hpp"
@@ -52,15 +51,24 @@ class JointPlaces {
       numbers_.push_back({tracks_[a].marker, a});
     }
     std::ranges::sort(numbers_);
-    links_.clear();
-    of_track_.resize(std::max(of_track_.size(), tracks_.size()));
-    for (std::vector<std::int32_t>& links : of_track_) links.clear();
+    known_.clear();
     for (std::int32_t a = 0; a < static_cast<std::int32_t>(tracks_.size()); ++a) {
       near_.clear();
       for (const Bond& bond : bonds_of(tracks_[a].marker)) add_known(a, bond);
-      for (const Known& one : near_) add_link(one);
+      known_.insert(known_.end(), near_.begin(), near_.end());
     }
-    for (Link& link : links_) link.ratio = ratio(link);
+    // A pair may be listed by both of its markers.
+    std::ranges::sort(known_, {}, [](const Known& one) { return std::tuple(one.a, one.b, one.V); });
+    const auto same = [](const Known& x, const Known& y) { return x.a == y.a && x.b == y.b; };
+    known_.erase(std::ranges::unique(known_, same).begin(), known_.end());
+    links_.clear();
+    of_track_.resize(std::max(of_track_.size(), tracks_.size()));
+    for (std::vector<std::int32_t>& links : of_track_) links.clear();
+    for (const Known& one : known_) {
+      for (const std::int32_t end : {one.a, one.b})
+        of_track_[end].push_back(static_cast<std::int32_t>(links_.size()));
+      links_.push_back({one, ratio(one)});
+    }
     place_.assign(tracks_.size(), nullptr);
   }
 
@@ -150,26 +158,14 @@ class JointPlaces {
     const std::int32_t b = find(bond.other);
     if (b != kNone) keep_smallest(near_, kMaxLinks, {std::min(a, b), std::max(a, b), bond.mean, V});
   }
-  // Adds a distance as a link. Where both markers list a pair, the steadier distance is used.
-  void add_link(const Known& one) {
-    for (const std::int32_t e : of_track_[one.a]) {
-      Known& same = links_[e];
-      if (same.a != one.a || same.b != one.b) continue;
-      same = std::min(same, one);
-      return;
-    }
-    for (const std::int32_t end : {one.a, one.b})
-      of_track_[end].push_back(static_cast<std::int32_t>(links_.size()));
-    links_.push_back({one});
-  }
   double distance(const Point& x, const Point& y) const {
     return std::sqrt(squared_distance(x, y, D_));
   }
   // The square of the likelihood ratio of the bond's own distance.
-  double ratio(const Known& link) const {
-    const Track &a = tracks_[link.a], &b = tracks_[link.b];
-    const double spread = link.V + a.variance + b.variance;
-    return spread / link.V * tail(distance(a.center, b.center) - link.distance, spread);
+  double ratio(const Known& one) const {
+    const Track &a = tracks_[one.a], &b = tracks_[one.b];
+    const double spread = one.V + a.variance + b.variance;
+    return spread / one.V * tail(distance(a.center, b.center) - one.distance, spread);
   }
   // Density of t at the mean over that at `off`, squared: (1 + x² / ν s²)^(ν + 1).
   static double tail(double off, double variance) {
@@ -243,7 +239,7 @@ class JointPlaces {
   std::vector<Track> tracks_;
   std::vector<std::int32_t> at_row_, order_;
   std::vector<std::pair<std::int32_t, std::int32_t>> numbers_;  // markers and their tracks
-  std::vector<Known> near_;
+  std::vector<Known> known_, near_;
   std::vector<Link> links_;
   std::vector<std::vector<std::int32_t>> of_track_;
   std::vector<std::size_t> first_;  // candidate of each track
