@@ -15,8 +15,10 @@ if TYPE_CHECKING:
 
     from asterism.model import Detections, TrackingModel
 
-__all__ = ["Pass", "go_through"]
+__all__ = ["GHOST", "Pass", "go_through"]
 
+GHOST = -2
+"""Marker of a tracklet that is a ghost."""
 FRAMES_A_CALL = 1000
 """Number of frames of one call. The engine's copy of their points takes little memory."""
 MIN_ADVICE, MAX_ADVICE = 1.0, 5.0
@@ -32,7 +34,7 @@ class Pass:
     tracklets : ndarray of int, shape (N,)
         Tracklet of each detection, -1 for clutter.
     markers : ndarray of int, shape (F,)
-        Marker of each tracklet, -2 for a ghost.
+        Marker of each tracklet, `GHOST` for a ghost.
     after : ndarray of int, shape (F,)
         Predecessor of each tracklet in the direction of the pass, -1 for the first of a
         marker.

@@ -6,7 +6,6 @@ stable distances do, because body segments move almost rigidly.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -19,20 +18,14 @@ from asterism.records import record
 from asterism.tracking.rigidity.bonds import Bonds, learn_bonds
 from asterism.tracking.stitching.exchanged import exchanged_by_distances
 from asterism.tracking.stitching.joined import joined_by_distances
-from asterism.tracking.stitching.passes import Pass, go_through
+from asterism.tracking.stitching.passes import GHOST, go_through
+from asterism.tracking.stitching.recovered import recovered_from_ghosts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
 __all__ = ["Join", "Stitching", "check_options", "stitch", "stitch_options"]
-
-GHOST = -2
-MAX_GHOST = 60
-"""Largest number of detections of a ghost. The longest track of ghosts had 39, on captures with
-simulated ghosts of up to 10 frames each."""
-KEPT = 0.95
-"""Probability of the joins of ghosts that are a marker. On simulated people 10 of 10 were right."""
 
 
 @record
@@ -171,11 +164,11 @@ def stitch(
     first.
 
     Three passes go through the capture, forward, backward and forward again; the joins of each
-    pass are prior information for the next. Ghosts that were cut from each other are a marker
-    if they have more than 60 detections. At the end two tracks are joined if they are in no
-    frame together and keep the same distances to other tracks, bodies that left the view and came
-    back are joined by the distances among their markers, and two tracks are exchanged where these
-    distances show that they have each other's marker.
+    pass are prior information for the next. Ghosts that follow each other in one input track are
+    a marker if they have more than 60 detections. At the end two tracks are joined if they are in
+    no frame together and keep the same distances to other tracks, bodies that left the view and
+    came back are joined by the distances among their markers, and two tracks are exchanged where
+    these distances show that they have each other's marker.
 
     Short pure tracklets give the best result: limit the model's gap by `tracklet_model`, as
     `track` does.
@@ -242,7 +235,7 @@ def stitch(
     found = go_through(d, found.tracklets, model, options, before=found, backward=True)
     options = stitch_options(*limits, may_cut=False)
     found = go_through(d, found.tracklets, model, options, before=found)
-    found = _with_long_ghosts(found, tracks, model.population.max_gap)
+    found = recovered_from_ghosts(found, tracks, model.population.max_gap)
     found = joined_by_distances(d, found, model.sensor.noise_sigma, max_occlusion)
     found = exchanged_by_distances(d, found, model)
     tracklets, markers, after = found.tracklets, found.markers, found.after
@@ -344,34 +337,6 @@ def _names(
             if names[marker] is None and name not in names:
                 names[marker] = name
     return tuple(names)
-
-
-def _with_long_ghosts(found: Pass, tracks: Tracks, max_gap: int) -> Pass:
-    """Return a pass in which long ghosts are markers: those that follow each other in a track.
-
-    A marker that its neighbours contradict again and again is cut into tracklets that are short for
-    that reason alone.
-    """
-    order, _ = tracks.by_track
-    order = order[found.tracklets[order] >= 0]
-    own = found.tracklets[order]
-    is_ghost = found.markers[own] == GHOST
-    starts = np.ones(len(order), dtype=bool)
-    starts[1:] = (
-        (np.diff(tracks.labels[order]) != 0)
-        | (np.diff(is_ghost) != 0)
-        | (np.diff(tracks.detections.frame_of[order]) > max_gap + 1)
-    )
-    run = np.cumsum(starts)
-    markers, after, probabilities = (
-        each.copy() for each in (found.markers, found.after, found.probabilities)
-    )
-    for each in np.flatnonzero(np.bincount(run[is_ghost]) > MAX_GHOST):
-        parts = np.unique(own[run == each])  # numbered by their start
-        markers[parts] = markers.max(initial=-1) + 1
-        after[parts[1:]] = parts[:-1]
-        probabilities[parts] = KEPT
-    return replace(found, markers=markers, after=after, probabilities=probabilities)
 
 
 def _cuts(tracks: Tracks, tracklets: NDArray[np.int32], max_gap: int) -> NDArray[np.int64]:
