@@ -3,7 +3,7 @@
 //   g_i(j)   gain of track i from detection j; 0 without a detection
 //   d, V     distance of a bond and the squared scale of its next value, which has a Student's t
 //            distribution with four degrees of freedom
-//   ŷ, S     predicted position of a track and its variance along an axis
+//   ŷ, S     predicted position of a track and the variance of a detection along an axis
 //   p(j, l)  effect of a bond of tracks i and k with detections j and l, which is the likelihood of
 //            their distance against what the predictions expect of it:
 //              log t_4(|y_j - y_l|; d, V) - log t_4(|ŷ_i - ŷ_k|; d, V + S_i + S_k)
@@ -18,6 +18,7 @@
 #include <cstdint>
 #include <span>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "base/flat_map.hpp"
@@ -51,24 +52,15 @@ class JointPlaces {
       numbers_.push_back({tracks_[a].marker, a});
     }
     std::ranges::sort(numbers_);
-    known_.clear();
-    for (std::int32_t a = 0; a < static_cast<std::int32_t>(tracks_.size()); ++a) {
-      near_.clear();
-      for (const Bond& bond : bonds_of(tracks_[a].marker)) add_known(a, bond);
-      known_.insert(known_.end(), near_.begin(), near_.end());
-    }
-    // A pair may be listed by both of its markers.
-    std::ranges::sort(known_, {}, [](const Known& one) { return std::tuple(one.a, one.b, one.V); });
-    const auto same = [](const Known& x, const Known& y) { return x.a == y.a && x.b == y.b; };
-    known_.erase(std::ranges::unique(known_, same).begin(), known_.end());
     links_.clear();
     of_track_.resize(std::max(of_track_.size(), tracks_.size()));
     for (std::vector<std::int32_t>& links : of_track_) links.clear();
-    for (const Known& one : known_) {
-      for (const std::int32_t end : {one.a, one.b})
-        of_track_[end].push_back(static_cast<std::int32_t>(links_.size()));
-      links_.push_back({one, ratio(one)});
+    for (std::int32_t a = 0; a < static_cast<std::int32_t>(tracks_.size()); ++a) {
+      near_.clear();
+      for (const Bond& bond : bonds_of(tracks_[a].marker)) add_known(a, bond);
+      for (const Known& one : near_) add_link(one);
     }
+    for (Link& link : links_) link.ratio = ratio(link, 0);
     place_.assign(tracks_.size(), nullptr);
   }
 
@@ -158,14 +150,27 @@ class JointPlaces {
     const std::int32_t b = find(bond.other);
     if (b != kNone) keep_smallest(near_, kMaxLinks, {std::min(a, b), std::max(a, b), bond.mean, V});
   }
+  // Adds a distance as a link. Where both markers list a pair, the steadier distance is used.
+  void add_link(const Known& one) {
+    for (const std::int32_t e : of_track_[one.a]) {
+      Known& same = links_[e];
+      if (same.a != one.a || same.b != one.b) continue;
+      same = std::min(same, one);
+      return;
+    }
+    for (const std::int32_t end : {one.a, one.b})
+      of_track_[end].push_back(static_cast<std::int32_t>(links_.size()));
+    links_.push_back({one});
+  }
   double distance(const Point& x, const Point& y) const {
     return std::sqrt(squared_distance(x, y, D_));
   }
-  // The square of the likelihood ratio of the bond's own distance.
-  double ratio(const Known& one) const {
-    const Track &a = tracks_[one.a], &b = tracks_[one.b];
-    const double spread = one.V + a.variance + b.variance;
-    return spread / one.V * tail(distance(a.center, b.center) - one.distance, spread);
+  // The square of the likelihood ratio of the bond's own distance. `noise` is the variance of the
+  // two detections beyond that of the sensor.
+  double ratio(const Known& link, double noise) const {
+    const Track &a = tracks_[link.a], &b = tracks_[link.b];
+    const double spread = link.V + a.variance + b.variance + noise;
+    return spread / link.V * tail(distance(a.center, b.center) - link.distance, spread);
   }
   // Density of t at the mean over that at `off`, squared: (1 + x² / ν s²)^(ν + 1).
   static double tail(double off, double variance) {
@@ -174,7 +179,9 @@ class JointPlaces {
   }
   // Most pairs of detections have an effect at a bound, for which no logarithm is needed.
   double effect(const Link& link, const Point& x, const Point& y) const {
-    const double squared = link.ratio / tail(distance(x, y) - link.distance, link.V);
+    const double noise = x.r + y.r;
+    const double squared = (noise > 0 ? ratio(link, noise) : link.ratio) /
+                           tail(distance(x, y) - link.distance, link.V);
     if (squared <= kLeastSquared) return kLeast;
     if (squared >= kMostSquared) return kMost;
     return 0.5 * logarithm(squared);
@@ -239,7 +246,7 @@ class JointPlaces {
   std::vector<Track> tracks_;
   std::vector<std::int32_t> at_row_, order_;
   std::vector<std::pair<std::int32_t, std::int32_t>> numbers_;  // markers and their tracks
-  std::vector<Known> known_, near_;
+  std::vector<Known> near_;
   std::vector<Link> links_;
   std::vector<std::vector<std::int32_t>> of_track_;
   std::vector<std::size_t> first_;  // candidate of each track

@@ -3,8 +3,10 @@
 //
 // In each frame, after prediction and before association:
 //
-//   1  All tracks are gated by their own predictions. Bonds decide jointly which detections they
-//      have in this frame (rigid/joint_places.hpp), which fixes the positions of their markers.
+//   1  All tracks are gated by their own predictions. A track that was detected in the last frame
+//      and has no clear candidate now may have an alternative, in which that detection is missed.
+//      Bonds decide jointly which detections they have in this frame (rigid/joint_places.hpp),
+//      which fixes the positions of their markers.
 //   2  Occluded tracks are predicted from these positions. The predicted position is fused with the
 //      track's own prediction (rigid/carried_state.hpp).
 //   3  Occluded tracks are gated by the fused or by their own prediction, whichever gives the
@@ -22,6 +24,7 @@
 #include <numbers>
 #include <optional>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "base/scratch.hpp"
@@ -42,23 +45,36 @@ class CarriedTracks {
   CarriedTracks(const MotionModel& m, const ScoreModel& score, const CarryOptions& options)
       : opt_(options), max_gap_(score.max_gap), carrier_(m.axis.D, m.axis.r) {}
 
+  struct NoAlternatives {};
   // Predicts every track to a frame and lists its candidates (see LiveTracks::list). The last
-  // `n_open` frames before it have not been passed to `learn`.
-  template <typename MinLogLikelihood, typename Gain>
+  // `n_open` frames before it have not been passed to `learn`. add_alternative(i) may add a row in
+  // which the last detection of track i is missed; it is called for the tracks that were detected
+  // then and have no clear candidate now.
+  template <typename MinLogLikelihood, typename Gain, typename AddAlternative = NoAlternatives>
   void list(LiveTracks<>& live, double time, const MotionStep& step, std::span<const Point> points,
             double min_gain, MinLogLikelihood&& min_log_likelihood, Gain&& gain,
-            std::vector<Candidate>& out, FrameStats& stats, std::int64_t n_open = 0) {
+            std::vector<Candidate>& out, FrameStats& stats, std::int64_t n_open = 0,
+            [[maybe_unused]] const AddAlternative& add_alternative = {}) {
     live.predict_all(step);
     out.clear();
     // Bonds can raise a gain, so the threshold is lowered.
     const auto list = [&](auto&& is_selected, std::vector<Candidate>& to) {
-      live.list(time, points, opt_.is_on ? min_gain - kReach : min_gain, is_selected, min_log_likelihood, gain,
-                to);
+      live.list(time, points, opt_.is_on ? min_gain - kReach : min_gain, is_selected,
+                min_log_likelihood, gain, to);
     };
     if (!opt_.is_on) return list([](std::size_t) { return true; }, out);
     list([&](std::size_t i) { return live[i].gap == 0; }, out);
     s_.all = out;
     list([&](std::size_t i) { return live[i].gap > 0; }, s_.all);
+    constexpr bool has_alternatives = !std::is_same_v<AddAlternative, NoAlternatives>;
+    if constexpr (has_alternatives) {
+      find_clear(live, points, min_gain);
+      const std::size_t n = live.size();
+      for (std::size_t i = 0; i < n; ++i)
+        if (live[i].gap == 0 && live[i].is_confirmed() && !s_.is_clear[i]) add_alternative(i);
+      live.predict_all(step, n);
+      list([&](std::size_t i) { return i >= n; }, s_.all);
+    }
     fix_positions(live, points);
     predict_occluded(live, n_open);
     s_.alone.clear();
@@ -72,7 +88,7 @@ class CarriedTracks {
     list([&](std::size_t i) { return live[i].gap > 0; }, out);
     std::ranges::stable_sort(out, {}, &Candidate::row);
     add_alone(out);
-    weigh(live, points, min_gain, out, stats);
+    weigh(live, points, min_gain, has_alternatives, out, stats);
     count_refused(min_gain, out, stats);
   }
 
@@ -137,6 +153,26 @@ class CarriedTracks {
   template <typename More>
   static std::int32_t number(const LiveTrack<More>& track) {
     return static_cast<std::int32_t>(track.id);
+  }
+
+  // Counts the tracks of each detection and the detections of each track among candidates.
+  void count_rivals(std::span<const Candidate> all, std::size_t n_tracks, std::size_t n_points) {
+    s_.n_rows.assign(n_points, 0);
+    s_.n_columns.assign(n_tracks, 0);
+    for (const Candidate& c : all) {
+      ++s_.n_rows[c.column];
+      ++s_.n_columns[c.row];
+    }
+  }
+  bool is_ambiguous(const Candidate& c, double min_gain) const {
+    return s_.n_rows[c.column] > 1 || s_.n_columns[c.row] > 1 || c.gain - kReach <= min_gain;
+  }
+  // Finds the tracks with a clear candidate, which has a high gain and no rivals by the tracks' own
+  // predictions. Such a track may still follow a ghost.
+  void find_clear(const LiveTracks<>& live, std::span<const Point> points, double min_gain) {
+    count_rivals(s_.all, live.size(), points.size());
+    s_.is_clear.assign(live.size(), 0);
+    for (const Candidate& c : s_.all) s_.is_clear[c.row] = !is_ambiguous(c, min_gain);
   }
 
   // Decides jointly where the confirmed tracks are.
@@ -211,24 +247,16 @@ class CarriedTracks {
     out.insert(out.end(), s_.added.begin(), s_.added.end());
     std::ranges::stable_sort(out, {}, &Candidate::row);
   }
-  // Applies ghosts and bonds to the gains of the candidates.
+  // Applies ghosts and bonds to the gains of the candidates. Where tracks have alternatives, bonds
+  // count for clear candidates too: they compare branches over several frames.
   void weigh(const LiveTracks<>& live, std::span<const Point> points, double min_gain,
-             std::vector<Candidate>& out, FrameStats& stats) {
-    s_.n_rows.assign(points.size(), 0);
-    s_.n_columns.assign(live.size(), 0);
-    for (const Candidate& c : out) {
-      ++s_.n_rows[c.column];
-      ++s_.n_columns[c.row];
-    }
-    const auto is_ambiguous = [&](const Candidate& c) {
-      return s_.n_rows[c.column] > 1 || s_.n_columns[c.row] > 1 ||
-             c.gain - kReach <= min_gain;
-    };
+             bool has_alternatives, std::vector<Candidate>& out, FrameStats& stats) {
+    count_rivals(out, live.size(), points.size());
     s_.bond_gains.clear();
     for (Candidate& c : out) {
       if (!live[c.row].is_confirmed()) continue;
       const bool was_listed = c.gain > min_gain;
-      if (is_ambiguous(c)) {
+      if (has_alternatives || is_ambiguous(c, min_gain)) {
         s_.bond_gains.push_back({c.row, c.column, s_.joint.gain(c.row, points[c.column])});
         c.gain += s_.bond_gains.back().nats;
       }
@@ -266,7 +294,7 @@ class CarriedTracks {
   }
 
   struct Memory {
-    std::vector<char> is_carried, is_uncertain;
+    std::vector<char> is_carried, is_uncertain, is_clear;
     std::vector<Carried> place;
     std::vector<BondGain> bond_gains;
     std::vector<MotionState> fused;

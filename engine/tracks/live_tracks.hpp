@@ -206,11 +206,12 @@ class LiveTracks {
     });
   }
 
-  void predict_all(const MotionStep& step) {
-    s_.predictions.clear();
-    for (Track& track : tracks) {
-      predict(m, step, track.state);
-      s_.predictions.emplace_back(m, track.state);
+  // Predicts the tracks from number `first` on; those before are predicted already.
+  void predict_all(const MotionStep& step, std::size_t first = 0) {
+    s_.predictions.resize(first);
+    for (std::size_t i = first; i < tracks.size(); ++i) {
+      predict(m, step, tracks[i].state);
+      s_.predictions.emplace_back(m, tracks[i].state);
     }
   }
 

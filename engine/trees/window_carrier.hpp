@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "base/scratch.hpp"
@@ -30,11 +31,13 @@ class WindowCarrier {
 
   bool is_on() const { return all_.has_value(); }
 
-  // Adds the information on a frame that follows `n_open` undecided ones.
+  // Adds the information on a frame that follows `n_open` undecided ones. Rows are the best
+  // branches and, for tracks without a clear candidate, an occluded one.
   void advise(const LiveTracks<Tree>& live, std::int64_t n_open, WindowFrame& frame,
               FrameStats& stats) {
     auto& [rows, carried] = all_.own();
-    list_rows(live, rows);
+    list_best(live, rows);
+    const std::size_t n_best = rows.size();
     // Gain of a confirmed track from a detection over missing it and leaving it unassigned.
     const double over = rows.leftover_gain();
     const auto base = [&](std::size_t i) {
@@ -44,11 +47,12 @@ class WindowCarrier {
         rows, frame.time, frame.step, frame.points, 0.0,
         [&](std::size_t i, double gain) { return gain - base(i); },
         [&](std::size_t i, double log_likelihood) { return base(i) + log_likelihood; },
-        s_.candidates, stats, n_open);
+        s_.candidates, stats, n_open,
+        [&](std::size_t i) { add_occluded(i, rows); });
     for (std::size_t i = 0; i < rows.size(); ++i) {
       NeighbourAdvice& own = s_.advice[s_.place[i]];
       const std::int32_t replaced_by = carried.replaced_by(i);
-      own.is_reappearance = own.is_reappearance || (replaced_by >= 0 && is_best(replaced_by));
+      if (replaced_by >= 0 && std::cmp_less(replaced_by, n_best)) own.is_reappearance = true;
       if (!carried.is_carried(i)) continue;
       own.is_carried = true;
       own.is_uncertain = carried.is_uncertain(i);
@@ -72,30 +76,36 @@ class WindowCarrier {
     CarriedTracks carried;
   };
   struct Memory {
-    std::vector<std::size_t> place;  // index in `advice` of each row's track
-    std::vector<NeighbourAdvice> advice;
+    std::vector<const LiveTrack<Tree>*> trees;  // the listed tracks
+    std::vector<NeighbourAdvice> advice;        // for each of them
+    std::vector<std::size_t> place;             // of each row's track in these lists
     std::vector<Candidate> candidates;
   };
 
-  // Lists the best branch of every confirmed track. If that branch has a detection in the last
-  // frame, its best occluded branch is listed too; otherwise the detection of the best branch could
-  // never be identified as a ghost.
-  void list_rows(const LiveTracks<Tree>& live, LiveTracks<>& rows) {
+  // Lists the best branch of every confirmed track.
+  void list_best(const LiveTracks<Tree>& live, LiveTracks<>& rows) {
     rows.tracks.clear();
     s_.place.clear();
+    s_.trees.clear();
     s_.advice.clear();
     for (const LiveTrack<Tree>& track : live.tracks) {
       const Branch& best = track.more.best();
       if (!track.is_confirmed() || best.has_ended) continue;
+      s_.trees.push_back(&track);
       s_.advice.emplace_back().track = track.more.key;
-      add_row(track, best, rows);
-      if (best.gap > 0) continue;
-      const auto occluded = std::ranges::find_if(
-          track.more.branches, [](const Branch& b) { return b.gap > 0 && !b.has_ended; });
-      if (occluded != track.more.branches.end()) add_row(track, *occluded, rows);
+      add_row(s_.trees.size() - 1, best, rows);
     }
   }
-  void add_row(const LiveTrack<Tree>& track, const Branch& b, LiveTracks<>& rows) {
+  // Adds the best branch of a listed track in which the last detection is missed; otherwise that
+  // detection could never be identified as a ghost.
+  void add_occluded(std::size_t i, LiveTracks<>& rows) {
+    const LiveTrack<Tree>& track = *s_.trees[i];
+    const auto occluded = std::ranges::find_if(
+        track.more.branches, [](const Branch& b) { return b.gap > 0 && !b.has_ended; });
+    if (occluded != track.more.branches.end()) add_row(i, *occluded, rows);
+  }
+  void add_row(std::size_t i, const Branch& b, LiveTracks<>& rows) {
+    const LiveTrack<Tree>& track = *s_.trees[i];
     LiveTrack<>& row = rows.tracks.emplace_back();
     row.id = track.id;
     row.gap = b.gap;
@@ -104,9 +114,8 @@ class WindowCarrier {
     row.last_time = b.last_time;
     row.last = b.last;
     row.state = track.more.state_of(rows.m, b);
-    s_.place.push_back(s_.advice.size() - 1);
+    s_.place.push_back(i);
   }
-  bool is_best(std::size_t row) const { return row == 0 || s_.place[row] != s_.place[row - 1]; }
 
   SharedCopy<All> all_;
   Scratch<Memory> s_;
