@@ -86,6 +86,24 @@ def test_more_moves_and_the_assignment_come_nearer():
     assert value(moves=20) > value(moves=20, proposal="uniform", move_weights="report")
 
 
+def test_a_longer_window_finds_no_less_with_as_many_moves_a_link():
+    less = []
+    for seed in range(1, 9):
+        scene = am.simulate.attracted(frames=60, seed=seed)
+        truth = am.simulate.corrupt(scene, missing=0.1, clutter=0.1, noise=2e-3, seed=seed)
+        model = am.estimate_model(truth.detections).model
+        short, long = (
+            am.track(
+                truth.detections,
+                am.MCMCDA(window=window, moves=10 * window, confidence=0, end_odds=1),
+                model=model,
+            ).info["log_posterior"]
+            for window in (10, 40)
+        )
+        less.append(short - long)
+    assert np.mean(less) < 1  # 2.4 where the chain samples the posterior of the window to the end
+
+
 def test_what_is_settled_stays_and_what_is_open_may_change():
     truth = crowd(4, spread=0.1, n_frames=60)
     d, model, window = truth.detections, crowd_model(), 4

@@ -26,11 +26,6 @@ inline Clock::time_point after(Clock::time_point start, double seconds) {
   return start + std::chrono::duration_cast<Clock::duration>(
                      std::chrono::duration<double>(std::max(seconds, 0.0)));
 }
-inline Clock::time_point halfway_to(Clock::time_point end) {
-  if (end == Clock::time_point::max()) return end;
-  const Clock::time_point now = Clock::now();
-  return now < end ? now + (end - now) / 2 : end;
-}
 
 // Regularly calls a callback with the fraction of the work done, on the thread that created the
 // object. The callback returns whether to continue.
@@ -66,6 +61,13 @@ struct Budget {
   Watch* watch = nullptr;
   static constexpr std::int64_t kLookEvery = 256;
 
+  // A share of it, whose time starts at `start`. It is not watched.
+  Budget first(double share, Clock::time_point start) const {
+    Budget out{static_cast<std::int64_t>(std::llround(share * static_cast<double>(moves))), until};
+    if (until != Clock::time_point::max() && share < 1)
+      out.until = start + std::chrono::duration_cast<Clock::duration>(share * (until - start));
+    return out;
+  }
   bool is_over(std::int64_t n) const {
     if (n >= moves) return true;
     if (n % 16 != 0) return false;

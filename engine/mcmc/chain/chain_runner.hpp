@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <numeric>
 #include <span>
 #include <utility>
@@ -40,7 +41,8 @@ class ChainRunner {
       : sampler_(std::move(empty), options, 0),
         marginals_(sampler_.partition()),
         hot_share_(options.share_at_ambiguous),
-        is_draw_(options.is_draw) {}
+        is_draw_(options.is_draw),
+        is_ascent_(options.is_ascent) {}
 
   // Lists the plausible moves at the ambiguous links of a group. Their detections have the numbers
   // of the whole partition.
@@ -58,13 +60,33 @@ class ChainRunner {
 
   // Searches for the best partition, returns its gain over the start, and stays there. With
   // `is_draw` it stays at the last state instead and returns infinity.
+  //
+  // A chain of the posterior visits partitions in which a few of many ambiguous links are not at
+  // their best. The search therefore goes back from the newest frames in stretches. In each it
+  // samples moves at the links of the stretch, returns to the best partition so far, and samples a
+  // power of the posterior, which takes hardly any other moves than gains.
   double search(const Partition<Filter>& whole, const Group& group, std::uint64_t seed,
                 const Budget& budget, ChainStats& stats) {
     begin(whole, group, seed);
     sampler_.weigh_above(sampler_.kOnlyWhatMayBeTaken);
-    const auto look_at_none = [](const Change<Filter>&, bool) {};
+    const auto start = Clock::now();
     std::int64_t n = 0;
-    for (; !budget.is_over(n); ++n) step(look_at_none);
+    const auto run_until = [&](double share) {
+      const Budget part = budget.first(share, start);
+      for (; !part.is_over(n) && !budget.is_over(n); ++n) step([](const Change<Filter>&, bool) {});
+    };
+    if (is_draw_ || is_ascent_) {
+      run_until(1);
+    } else {
+      each_stretch([&](double from, double to) {
+        run_until(from + kSampled * (to - from));
+        sampler_.restore_best();
+        sampler_.cool(kColdness);
+        run_until(to);
+        sampler_.restore_best();
+        sampler_.cool(1);
+      });
+    }
     stats.n_search += n;
     stats.add_moves(sampler_.counts());
     if (is_draw_) return std::numeric_limits<double>::infinity();
@@ -92,7 +114,7 @@ class ChainRunner {
     for (int h = 0; h < Halves::kN; ++h) {
       marginals_.forget();
       trace.begin(half);
-      const Budget own{half, h + 1 < Halves::kN ? halfway_to(budget.until) : budget.until, budget.watch};
+      const Budget own{half, h + 1 < Halves::kN ? budget.first(0.5, Clock::now()).until : budget.until, budget.watch};
       std::int64_t n = 0;
       for (; n == 0 || !own.is_over(n); ++n) {
         step(weigh);
@@ -112,6 +134,9 @@ class ChainRunner {
   }
 
  private:
+  static constexpr std::int64_t kStretch = 10;  // frames
+  static constexpr double kSampled = 0.7;       // of the moves of a stretch
+  static constexpr double kColdness = 100;      // power of the posterior in the others
   // Log ratio without the reverse move below which a rejected move is not evaluated further.
   static constexpr double kLookedAtAbove = -9;
 
@@ -130,6 +155,26 @@ class ChainRunner {
       add_listed({kind, local(y), local(a), local(c)}, gain);
     }
     forget_numbers();
+  }
+
+  // Calls visit(from, to) with the plausible moves of each stretch of frames, from the newest to the
+  // oldest, and its share of all plausible moves as an interval.
+  template <typename Visit>
+  void each_stretch(Visit&& visit) {
+    const DetectionWindow& window = sampler_.partition().window();
+    std::map<std::int64_t, std::vector<Hot>> stretches;
+    for (const Hot& hot : hot_)
+      stretches[(window.now() - window[hot.move.toggle.y].frame) / kStretch].push_back(hot);
+    if (stretches.size() < 2) return visit(0.0, 1.0);
+    const auto n_all = static_cast<double>(hot_.size());
+    double from = 0;
+    for (const auto& [number, stretch] : stretches) {
+      hot_.clear();
+      for (const Hot& hot : stretch) add_listed(hot.move.toggle, hot.gain);
+      const double to = from + static_cast<double>(stretch.size()) / n_all;
+      visit(from, to);
+      from = to;
+    }
   }
 
   template <typename Observe>
@@ -219,7 +264,7 @@ class ChainRunner {
   Sampler<Filter> sampler_;
   Marginals<Filter> marginals_;
   double hot_share_;
-  bool is_draw_;
+  bool is_draw_, is_ascent_;
   // The plausible moves at ambiguous links, each with its cumulative weight.
   struct Hot {
     typename Sampler<Filter>::Listed move;

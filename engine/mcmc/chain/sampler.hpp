@@ -56,9 +56,10 @@ class Sampler {
   const Partition<Filter>& partition() const { return partition_; }
   const std::array<MoveCounts, kMoves>& counts() const { return counts_; }
 
-  // Restarts with another seed.
+  // Restarts with another seed, as a chain of the posterior.
   void begin(std::uint64_t seed) {
     random_ = Random(seed);
+    coldness_ = 1;
     counts_ = {};
     best_gain_ = last_gain_ = 0;
   }
@@ -86,9 +87,9 @@ class Sampler {
     // log_reverse is at most 0, so a ratio that is too small without it stays too small.
     const double threshold = std::min(log_u, weighed_above_) - (shared_.is_on() ? kSharedReach : 0);
     const double log_proposal = (best_gain_ - last_gain_) + then.log[back] - now.log[kind];
-    change_.min_gain = threshold - log_proposal + change_.log_forward;
+    change_.min_gain = (threshold - log_proposal + change_.log_forward) / coldness_;
     if (!moves_.weigh(change_)) return false;
-    change_.log_ratio = change_.gain + log_proposal - change_.log_forward;
+    change_.log_ratio = coldness_ * change_.gain + log_proposal - change_.log_forward;
     if (!(change_.log_ratio > threshold)) return false;
     if (shared_.is_on()) add_shared();
     const bool is_weighed = change_.log_ratio > weighed_above_;
@@ -122,7 +123,8 @@ class Sampler {
       move.gain = change_.gain;
       move.weighed = partition_.clock();
     }
-    change_.gain = change_.log_ratio = move.gain;
+    change_.gain = move.gain;
+    change_.log_ratio = coldness_ * move.gain;
     const double log_u = std::log(random_.uniform());
     if (shared_.is_on() && move.gain > std::min(log_u, 0.0) - kSharedReach) add_shared();
     return take(log_u, true, observe);
@@ -173,6 +175,9 @@ class Sampler {
     gain_ = max_gain_;
   }
 
+  // From now on the chain is one of the posterior to this power, until `begin`.
+  void cool(double coldness) { coldness_ = coldness; }
+
   // Proposals with a log ratio above this, without the reverse move, are evaluated completely even
   // if they will be rejected. Estimators of marginals need them.
   void weigh_above(double log_p) { weighed_above_ = log_p; }
@@ -209,7 +214,7 @@ class Sampler {
   void add_shared() {
     const double gain = shared_.gain(change_.all());
     change_.gain += gain;
-    change_.log_ratio += gain;
+    change_.log_ratio += coldness_ * gain;
   }
   void weigh_completely() {
     change_.min_gain = -std::numeric_limits<double>::infinity();
@@ -272,6 +277,7 @@ class Sampler {
   // Ascent: log posterior of the best partition and of the last accepted one, relative to the
   // start.
   double best_gain_ = 0, last_gain_ = 0;
+  double coldness_ = 1;  // power of the posterior, an inverse temperature
   double weighed_above_ = kOnlyWhatMayBeTaken;
 
   // Since `begin_best`: the gain, its maximum, and whether the present partition attains it. If it

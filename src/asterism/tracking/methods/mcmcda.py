@@ -53,9 +53,10 @@ class MCMCDA(EngineMethod):
     ----------
     window : int or None
         Number of frames after which a frame is decided, ≥ 1; 1 is the single-scan form. Larger
-        windows use more evidence and more time. None is for whole captures: after the last frame
-        the chains process all frames again in blocks of 100 that overlap by half, each conditional
-        on the frames before and after it. The time is linear in the length of the capture.
+        windows use more evidence and need more `moves`. None is for whole captures: after the last
+        frame the chains process all frames again in blocks of 100 that overlap by half, each
+        conditional on the frames before and after it. The time is linear in the length of the
+        capture.
     moves : float or None
         Monte Carlo moves per frame and ambiguous detection (or track, if there are more tracks),
         ≥ 0. Larger values search longer. None for a `deadline` alone. 0 requires initial labels:
