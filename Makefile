@@ -56,6 +56,7 @@ tables: $(VENV)/.bench
 	cp build/reproduction/images/*.svg docs/images
 	$(BIN)/python benchmarks/crossing.py --markdown docs/tables/crossing.md \
 	  --figure docs/images/reliability.png
+	$(BIN)/python benchmarks/windows.py --markdown docs/tables/windows.md
 	$(BIN)/python benchmarks/several_frames.py --markdown docs/tables/several_frames.md
 	$(BIN)/python benchmarks/scenes.py --seeds 5 --markdown docs/tables/scenes.md
 	$(BIN)/python benchmarks/captures.py --markdown docs/tables/captures.md
