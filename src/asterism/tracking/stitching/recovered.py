@@ -1,4 +1,4 @@
-"""Markers that stitching took for many ghosts in a row."""
+"""Markers that stitching took for many ghosts."""
 
 from __future__ import annotations
 
@@ -16,18 +16,20 @@ if TYPE_CHECKING:
 __all__ = ["recovered_from_ghosts"]
 
 MAX_GHOSTS = 60
-"""Largest number of detections of ghosts in a row. The longest row had 39, on captures with
-simulated ghosts of up to 10 frames each."""
+"""Largest number of detections of ghosts in one track. It was 39 on captures with simulated ghosts
+of up to 10 frames each."""
+MOST = 0.9
+"""Smallest share of ghosts in a track of a marker. The ghosts of tracks that change between markers
+in fast motion were at most 56 %."""
 RECOVERED = 0.95
-"""Probability of the joins in a row that is a marker. On simulated people 10 of 10 were right."""
+"""Probability of the joins of a marker. On simulated people 10 of 10 were right."""
 
 
-def recovered_from_ghosts(found: Pass, tracks: Tracks, max_gap: int) -> Pass:
-    """Take each long row of ghosts for a marker.
+def recovered_from_ghosts(found: Pass, tracks: Tracks) -> Pass:
+    """Take the ghosts of a long track for a marker where it has hardly anything else.
 
     A marker that its neighbours contradict again and again is cut into tracklets that are ghosts
-    only because they are short. They are a row: they follow each other in one of the tracks that
-    are stitched.
+    only because they are short.
 
     Parameters
     ----------
@@ -35,30 +37,22 @@ def recovered_from_ghosts(found: Pass, tracks: Tracks, max_gap: int) -> Pass:
         Result of the last pass.
     tracks : Tracks
         Tracks that are stitched.
-    max_gap : int
-        Longest gap in a row, frames.
 
     Returns
     -------
     Pass
         The same tracklets, of more markers and fewer ghosts.
     """
-    order, _ = tracks.by_track
-    order = order[found.tracklets[order] >= 0]
-    own = found.tracklets[order]
+    inside = np.flatnonzero(found.tracklets >= 0)
+    track, own = tracks.labels[inside], found.tracklets[inside]
     is_ghost = found.markers[own] == GHOST
-    starts = np.ones(len(order), dtype=bool)
-    starts[1:] = (
-        (np.diff(tracks.labels[order]) != 0)
-        | (np.diff(is_ghost) != 0)
-        | (np.diff(tracks.detections.frame_of[order]) > max_gap + 1)
-    )
-    row = np.cumsum(starts)
+    n_all = np.bincount(track)
+    n_ghosts = np.bincount(track[is_ghost], minlength=len(n_all))
     markers, after, probabilities = (
         each.copy() for each in (found.markers, found.after, found.probabilities)
     )
-    for each in np.flatnonzero(np.bincount(row[is_ghost]) > MAX_GHOSTS):
-        parts = np.unique(own[row == each])  # numbered by their start
+    for each in np.flatnonzero((n_ghosts > MAX_GHOSTS) & (n_ghosts >= MOST * n_all)):
+        parts = np.unique(own[is_ghost & (track == each)])  # numbered by their start
         markers[parts] = markers.max(initial=-1) + 1
         after[parts[1:]] = parts[:-1]
         probabilities[parts] = RECOVERED

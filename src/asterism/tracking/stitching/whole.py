@@ -164,11 +164,11 @@ def stitch(
     first.
 
     Three passes go through the capture, forward, backward and forward again; the joins of each
-    pass are prior information for the next. Ghosts that follow each other in one input track are
-    a marker if they have more than 60 detections. At the end two tracks are joined if they are in
-    no frame together and keep the same distances to other tracks, bodies that left the view and
-    came back are joined by the distances among their markers, and two tracks are exchanged where
-    these distances show that they have each other's marker.
+    pass are prior information for the next. The ghosts of an input track are a marker if it has
+    more than 60 detections of them and hardly any others. At the end two tracks are joined if
+    they are in no frame together and keep the same distances to other tracks, bodies that left
+    the view and came back are joined by the distances among their markers, and two tracks are
+    exchanged where these distances show that they have each other's marker.
 
     Short pure tracklets give the best result: limit the model's gap by `tracklet_model`, as
     `track` does.
@@ -235,7 +235,7 @@ def stitch(
     found = go_through(d, found.tracklets, model, options, before=found, backward=True)
     options = stitch_options(*limits, may_cut=False)
     found = go_through(d, found.tracklets, model, options, before=found)
-    found = recovered_from_ghosts(found, tracks, model.population.max_gap)
+    found = recovered_from_ghosts(found, tracks)
     found = joined_by_distances(d, found, model.sensor.noise_sigma, max_occlusion)
     found = exchanged_by_distances(d, found, model)
     tracklets, markers, after = found.tracklets, found.markers, found.after
