@@ -3,10 +3,11 @@
 //   g_i(j)   gain of track i from detection j; 0 without a detection
 //   d, V     distance of a bond and the squared scale of its next value, which has a Student's t
 //            distribution with four degrees of freedom
-//   ŷ, S     predicted position of a track and the variance of a detection along an axis
+//   ŷ, S     predicted position of a track and its variance along an axis, with the sensor's noise
+//   r        variance of a detection in addition to that of the sensor
 //   p(j, l)  effect of a bond of tracks i and k with detections j and l, which is the likelihood of
 //            their distance against what the predictions expect of it:
-//              log t_4(|y_j - y_l|; d, V) - log t_4(|ŷ_i - ŷ_k|; d, V + S_i + S_k)
+//              log t_4(|y_j - y_l|; d, V) - log t_4(|ŷ_i - ŷ_k|; d, V + S_i + r_j + S_k + r_l)
 //
 // The sum of all g and p is maximised by messages between bonded tracks (max-product). They are
 // damped and end after a few rounds, so that the maximum is approximate where bonds form cycles.

@@ -168,7 +168,7 @@ class CarriedTracks {
     return s_.n_rows[c.column] > 1 || s_.n_columns[c.row] > 1 || c.gain - kReach <= min_gain;
   }
   // Finds the tracks with a clear candidate, which has a high gain and no rivals by the tracks' own
-  // predictions. Such a track may still follow a ghost.
+  // predictions.
   void find_clear(const LiveTracks<>& live, std::span<const Point> points, double min_gain) {
     count_rivals(s_.all, live.size(), points.size());
     s_.is_clear.assign(live.size(), 0);
@@ -257,8 +257,9 @@ class CarriedTracks {
       if (!live[c.row].is_confirmed()) continue;
       const bool was_listed = c.gain > min_gain;
       if (has_alternatives || is_ambiguous(c, min_gain)) {
-        s_.bond_gains.push_back({c.row, c.column, s_.joint.gain(c.row, points[c.column])});
-        c.gain += s_.bond_gains.back().nats;
+        const double nats = s_.joint.gain(c.row, points[c.column]);
+        if (nats != 0) s_.bond_gains.push_back({c.row, c.column, nats});
+        c.gain += nats;
       }
       if (is_carried(c.row) && (!(c.gain > s_.ghosts[c.row]) || !may_take(live, c))) c.gain = kNever;
       // Occluded tracks are counted in count_refused, against their own predictions.

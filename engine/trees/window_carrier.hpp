@@ -96,8 +96,8 @@ class WindowCarrier {
       add_row(s_.trees.size() - 1, best, rows);
     }
   }
-  // Adds the best branch of a listed track in which the last detection is missed; otherwise that
-  // detection could never be identified as a ghost.
+  // Adds the best branch of a listed track that misses the last frame: what it was given there may
+  // be a ghost.
   void add_occluded(std::size_t i, LiveTracks<>& rows) {
     const LiveTrack<Tree>& track = *s_.trees[i];
     const auto occluded = std::ranges::find_if(

@@ -61,7 +61,7 @@ struct Budget {
   Watch* watch = nullptr;
   static constexpr std::int64_t kLookEvery = 256;
 
-  // A share of it, whose time starts at `start`. It is not watched.
+  // The first part of the budget, without its watch. Its time counts from `start`.
   Budget first(double share, Clock::time_point start) const {
     Budget out{static_cast<std::int64_t>(std::llround(share * static_cast<double>(moves))), until};
     if (until != Clock::time_point::max() && share < 1)

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <map>
 #include <numeric>
 #include <span>
 #include <utility>
@@ -157,18 +156,21 @@ class ChainRunner {
     forget_numbers();
   }
 
-  // Calls visit(from, to) with the plausible moves of each stretch of frames, from the newest to the
-  // oldest, and its share of all plausible moves as an interval.
+  // Calls visit(from, to) with the plausible moves of each stretch of about kStretch frames, from the
+  // newest to the oldest, and its share of all plausible moves as an interval.
   template <typename Visit>
   void each_stretch(Visit&& visit) {
     const DetectionWindow& window = sampler_.partition().window();
-    std::map<std::int64_t, std::vector<Hot>> stretches;
-    for (const Hot& hot : hot_)
-      stretches[(window.now() - window[hot.move.toggle.y].frame) / kStretch].push_back(hot);
-    if (stretches.size() < 2) return visit(0.0, 1.0);
+    const auto age = [&](const Hot& hot) { return window.now() - window[hot.move.toggle.y].frame; };
+    std::int64_t n_frames = 1;
+    for (const Hot& hot : hot_) n_frames = std::max(n_frames, age(hot) + 1);
+    const std::int64_t n = (n_frames + kStretch / 2) / kStretch;
+    if (n < 2) return visit(0.0, 1.0);
+    std::vector<std::vector<Hot>> stretches(n);
+    for (const Hot& hot : hot_) stretches[age(hot) * n / n_frames].push_back(hot);
     const auto n_all = static_cast<double>(hot_.size());
     double from = 0;
-    for (const auto& [number, stretch] : stretches) {
+    for (const std::vector<Hot>& stretch : stretches) {
       hot_.clear();
       for (const Hot& hot : stretch) add_listed(hot.move.toggle, hot.gain);
       const double to = from + static_cast<double>(stretch.size()) / n_all;

@@ -41,11 +41,12 @@ FLOOR = 1e-4
 class MCMCDA(EngineMethod):
     """Markov chain Monte Carlo data association: sampling of the partitions of a window.
 
-    A move proposes a new partition and is accepted with the Metropolis-Hastings probability, so the
-    chain samples the posterior of partitions (`log_posterior`). In each frame the chain starts from
-    the exact assignment of the new detections, and the best visited partition is kept. It decides
-    the frame that leaves the window. Of decided frames only the filter states of the tracks are
-    kept, so the cost of a frame does not grow with time.
+    A move proposes a new partition and is accepted with the Metropolis-Hastings probability, so
+    the chain samples the posterior of partitions (`log_posterior`); the last moves of a search
+    accept hardly anything but gains. In each frame the chain starts from the exact assignment of
+    the new detections, and the best visited partition is kept. It decides the frame that leaves
+    the window. Of decided frames only the filter states of the tracks are kept, so the cost of a
+    frame does not grow with time.
 
     Until a frame is decided its labels are those of the best partition so far, and can change.
 
