@@ -138,7 +138,7 @@ def score_table(title: str, found: Mapping[str, Scores]) -> Table:
             "IDF1", "nats above the oracle")  # fmt: skip
     rows = [
         [name, f"{s.moves.mean():.0f}", spread(s.strict), spread(s.wrong), spread(s.tracks, 1),
-         spread(s.missing), spread(s.idf1, 3), f"{s.gain.mean():.1f}".replace("-", "−")]
+         spread(s.missing), spread(s.idf1, 3), f"{s.gain.mean():z.1f}".replace("-", "−")]
         for name, s in found.items()
     ]  # fmt: skip
     return Table(title, head, rows)
