@@ -69,13 +69,15 @@ void budgets_of_nothing_and_of_everything() {
   while (!was_asked) watch.is_stopped_before(0);
 }
 
-// Each half of a chain must get half of the time.
-void each_half_has_half_of_the_time() {
+// A share of a budget has that share of the moves and of the time.
+void a_share_of_a_budget() {
   const Clock::time_point now = Clock::now(), end = after(now, 10);
-  const double first = std::chrono::duration<double>(halfway_to(end) - now).count();
-  CHECK(first > 4.9 && first < 5.2);
-  CHECK(halfway_to(Clock::time_point::max()) == Clock::time_point::max());
-  CHECK(halfway_to(after(now, -1)) <= Clock::now());
+  const Budget half = Budget{1001, end}.first(0.5, now);
+  const double seconds = std::chrono::duration<double>(half.until - now).count();
+  CHECK(half.moves == 501 && seconds > 4.9 && seconds < 5.1);
+  CHECK((Budget{1, end}.first(1, now).until == end));
+  CHECK((Budget{1}.first(0.5, now).until == Clock::time_point::max()));
+  CHECK((Budget{1, now}.first(0.5, after(now, 1)).is_over(0)));
 }
 
 // A chain that never moved has no known effective sample size and no R-hat.
@@ -402,7 +404,7 @@ int main() {
   no_gain_exceeds_its_bound<SeveralMotions>(3);
   exceptions_reach_the_caller();
   budgets_of_nothing_and_of_everything();
-  each_half_has_half_of_the_time();
+  a_share_of_a_budget();
   mixing_that_is_not_known();
   places_by_number();
   flat_maps_are_maps();
