@@ -63,7 +63,7 @@ class ChainRunner {
   // A chain of the posterior visits partitions in which a few of many ambiguous links are not at
   // their best. The search therefore goes back from the newest frames in stretches. In each it
   // samples moves at the links of the stretch, returns to the best partition so far, and samples a
-  // power of the posterior, which takes hardly any other moves than gains.
+  // power of the posterior, which accepts hardly any loss.
   double search(const Partition<Filter>& whole, const Group& group, std::uint64_t seed,
                 const Budget& budget, ChainStats& stats) {
     begin(whole, group, seed);
@@ -113,7 +113,9 @@ class ChainRunner {
     for (int h = 0; h < Halves::kN; ++h) {
       marginals_.forget();
       trace.begin(half);
-      const Budget own{half, h + 1 < Halves::kN ? budget.first(0.5, Clock::now()).until : budget.until, budget.watch};
+      const bool is_last = h + 1 == Halves::kN;
+      const Clock::time_point until = budget.first(is_last ? 1 : 0.5, Clock::now()).until;
+      const Budget own{half, until, budget.watch};
       std::int64_t n = 0;
       for (; n == 0 || !own.is_over(n); ++n) {
         step(weigh);

@@ -85,7 +85,8 @@ class Sampler {
     const int back = static_cast<int>(inverse(change_.move));
     const double log_u = std::log(random_.uniform());
     // log_reverse is at most 0, so a ratio that is too small without it stays too small.
-    const double threshold = std::min(log_u, weighed_above_) - (shared_.is_on() ? coldness_ * kSharedReach : 0);
+    const double reach = shared_.is_on() ? coldness_ * kSharedReach : 0;
+    const double threshold = std::min(log_u, weighed_above_) - reach;
     const double log_proposal = (best_gain_ - last_gain_) + then.log[back] - now.log[kind];
     change_.min_gain = (threshold - log_proposal + change_.log_forward) / coldness_;
     if (!moves_.weigh(change_)) return false;

@@ -1,4 +1,4 @@
-"""Markers that stitching took for many ghosts."""
+"""Markers all of whose tracklets stitching took for ghosts."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ RECOVERED = 0.95
 
 
 def recovered_from_ghosts(found: Pass, tracks: Tracks) -> Pass:
-    """Take the ghosts of a long track for a marker where it has hardly anything else.
+    """Make a marker of the ghosts of a long track that has hardly any other detections.
 
     A marker that its neighbours contradict again and again is cut into tracklets that are ghosts
     only because they are short.
