@@ -103,6 +103,22 @@ def test_initial_tracks_keep_what_is_improbable_until_more_detections_follow(
 
 
 @pytest.mark.parametrize("window", [10, None])
+@pytest.mark.parametrize("seed", [2, 3])
+def test_initial_tracks_are_the_start_although_others_are_nearer(seed, window):
+    """A track with a gap must not begin with clutter or with another track's first detection."""
+    truth = am.simulate.person(activity="run", frames=80, seed=seed)
+    truth = am.simulate.corrupt(truth, missing=0.3, clutter=0.3, noise=3e-4, stride=2, seed=seed)
+    model = am.tracking.tracklet_model(am.estimate_model(truth.detections).model)
+    start = am.metrics.oracle_tracks(truth, model.population.max_gap)
+    few = am.MCMCDA(window=window, moves=0, confidence=0)
+    kept = am.track(truth.detections, few, model=model, start=start, stitch=False)
+    assert not kept.info["refused_links"]
+    long = np.append(start.lengths > 1, False)[start.labels]
+    assert np.array_equal(kept.labels >= 0, long)
+    assert len(set(zip(kept.labels[long], start.labels[long], strict=True))) == kept.n_tracks
+
+
+@pytest.mark.parametrize("window", [10, None])
 def test_without_a_move_and_a_start_nothing_could_begin(window):
     # Every detection would be clutter, without a message.
     truth = wanderers(np.random.default_rng(6), n_frames=10)

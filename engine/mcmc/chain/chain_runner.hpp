@@ -47,6 +47,7 @@ class ChainRunner {
   // of the whole partition.
   std::vector<HotMove> list(const Partition<Filter>& whole, const Group& group) {
     sampler_.partition().take_part(whole, group.tracks, group.free);
+    sampler_.begin_part(whole, group.tracks);
     list_hot(group.ambiguous);
     std::vector<HotMove> out;
     for (const Hot& hot : hot_) {

@@ -38,7 +38,8 @@ class ParallelChains {
     });
   }
 
-  // Sets each group to the best state that its chains find.
+  // Sets each group to the best state that its chains find. Where markers accelerate together, the
+  // score of a group depends on the others, so that each is searched after the one before.
   void search(Partition<Filter>& whole, std::span<Group> groups, const Budgets& budgets,
               std::uint64_t seed, ChainStats& stats) {
     struct Found {
@@ -47,19 +48,23 @@ class ParallelChains {
       std::vector<Edit<Filter>> edits;
     };
     std::vector<Found> found(groups.size() * n_chains_);
-    each(whole, groups, n_chains_, [&](ChainRunner<Filter>& runner, std::size_t task) {
-      const std::size_t g = task / n_chains_;
-      Found& own = found[task];
-      own.gain = runner.search(whole, groups[g], seed_of(seed, task), budgets.of(g), own.stats);
-      if (own.gain > 0) own.edits = edits_to_part(whole, runner.partition(), groups[g].tracks);
-    });
-    for (std::size_t g = 0; g < groups.size(); ++g) {
-      const auto first = found.begin() + static_cast<std::ptrdiff_t>(g) * n_chains_;
-      const auto last = first + n_chains_;
-      for (auto one = first; one != last; ++one) stats.add(one->stats);
-      const auto best = std::max_element(
-          first, last, [](const Found& a, const Found& b) { return a.gain < b.gain; });
-      if (best->gain > 0) change(whole, groups[g], best->edits);
+    const std::size_t n_at_once = whole.is_shared() ? 1 : groups.size();
+    for (std::size_t begin = 0; begin < groups.size(); begin += n_at_once) {
+      each(whole, groups.subspan(begin, n_at_once), n_chains_,
+           [&](ChainRunner<Filter>& runner, std::size_t n) {
+        const std::size_t task = begin * n_chains_ + n, g = task / n_chains_;
+        Found& own = found[task];
+        own.gain = runner.search(whole, groups[g], seed_of(seed, task), budgets.of(g), own.stats);
+        if (own.gain > 0) own.edits = edits_to_part(whole, runner.partition(), groups[g].tracks);
+      });
+      for (std::size_t g = begin; g < begin + n_at_once; ++g) {
+        const auto first = found.begin() + static_cast<std::ptrdiff_t>(g) * n_chains_;
+        const auto last = first + n_chains_;
+        for (auto one = first; one != last; ++one) stats.add(one->stats);
+        const auto best = std::max_element(
+            first, last, [](const Found& a, const Found& b) { return a.gain < b.gain; });
+        if (best->gain > 0) change(whole, groups[g], best->edits);
+      }
     }
   }
 

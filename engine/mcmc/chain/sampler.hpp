@@ -85,7 +85,7 @@ class Sampler {
     const int back = static_cast<int>(inverse(change_.move));
     const double log_u = std::log(random_.uniform());
     // log_reverse is at most 0, so a ratio that is too small without it stays too small.
-    const double reach = shared_.is_on() ? coldness_ * kSharedReach : 0;
+    const double reach = coldness_ * shared_.reach();
     const double threshold = std::min(log_u, weighed_above_) - reach;
     const double log_proposal = (best_gain_ - last_gain_) + then.log[back] - now.log[kind];
     change_.min_gain = (threshold - log_proposal + change_.log_forward) / coldness_;
@@ -127,15 +127,16 @@ class Sampler {
     change_.gain = move.gain;
     change_.log_ratio = coldness_ * move.gain;
     const double log_u = std::log(random_.uniform());
-    if (shared_.is_on() && move.gain > std::min(log_u, 0.0) - kSharedReach) add_shared();
+    if (shared_.is_on() && move.gain > std::min(log_u, 0.0) - shared_.reach()) add_shared();
     return take(log_u, true, observe);
   }
   // Estimates the gain of a move. Returns false if it is impossible or not above `min_gain`.
   bool estimate(const Toggle& toggle, double min_gain, double& gain) {
-    change_.min_gain = min_gain;
-    if (!toggles_.propose(toggle, change_) || !toggles_.estimate(change_)) return false;
-    gain = change_.gain;
-    return true;
+    if (!toggles_.propose(toggle, change_)) return false;
+    change_.min_gain = min_gain - shared_.reach();
+    if (!(shared_.is_on() ? toggles_.weigh(change_) : toggles_.estimate(change_))) return false;
+    gain = change_.gain + (shared_.is_on() ? shared_.gain(change_.all()) : 0);
+    return gain > min_gain;
   }
   Random& random() { return random_; }
 
@@ -284,8 +285,6 @@ class Sampler {
   // Since `begin_best`: the gain, its maximum, and whether the present partition attains it. If it
   // does not, the tracks of the best partition are saved.
   static constexpr double kBetter = 1e-9;
-  // Nats by which a shared term may outweigh the own scores. Changes beyond are rejected at once.
-  static constexpr double kSharedReach = 30;
   double gain_ = 0, max_gain_ = 0;
   bool is_best_ = false;
   std::vector<std::int32_t> saved_, first_saved_;

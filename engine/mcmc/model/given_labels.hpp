@@ -12,14 +12,17 @@ namespace asterism {
 // Labels by number of arrival, from `first` on, -1 for none. With `shared` they are also those of
 // the markers that accelerate together.
 struct GivenLabels {
+  // Nats by which a shared term may outweigh the own scores. Changes beyond are rejected at once.
+  static constexpr double kReach = 30;
+
   std::int64_t first = 0;
   std::vector<std::int64_t> labels;
   std::shared_ptr<const SharedAcceleration> shared;
 
-  std::int64_t of(std::int64_t number) const {
-    const std::int64_t at = number - first;
-    return at >= 0 && at < static_cast<std::int64_t>(labels.size()) ? labels[at] : -1;
+  bool covers(std::int64_t number) const {
+    return number >= first && number - first < static_cast<std::int64_t>(labels.size());
   }
+  std::int64_t of(std::int64_t number) const { return covers(number) ? labels[number - first] : -1; }
 };
 
 }  // namespace asterism

@@ -42,6 +42,8 @@ class Partition {
   // Sets labels of the detections to come, by which tracks are of markers.
   void give(std::shared_ptr<const GivenLabels> given) { given_ = std::move(given); }
   const GivenLabels* given() const { return given_.get(); }
+  // Whether markers accelerate together.
+  bool is_shared() const { return given_ != nullptr && given_->shared != nullptr; }
   std::int64_t given_label(std::int32_t i) const { return given_->of(window_[i].number); }
   // The marker of a track, which is the label given to its first detection; -1 for none.
   std::int32_t marker(std::int32_t k) const {
@@ -49,7 +51,7 @@ class Partition {
     return t.n_gone + t.n_frozen > 0 ? t.marker : marker_begun_by(first(k));
   }
   std::int32_t marker_begun_by(std::int32_t i) const {
-    return given_ && given_->shared ? static_cast<std::int32_t>(given_label(i)) : -1;
+    return is_shared() ? static_cast<std::int32_t>(given_label(i)) : -1;
   }
 
   const DetectionWindow& window() const { return window_; }

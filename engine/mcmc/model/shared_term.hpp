@@ -39,7 +39,7 @@ class SharedTerm {
     whole_ = &whole;
     part_ = &part;
     is_on_ = false;
-    if (whole.given() == nullptr || whole.given()->shared == nullptr) return;
+    if (!whole.is_shared()) return;
     shared_ = whole.given()->shared.get();
     first_ = whole.window().first();
     n_frames_ = whole.window().now() - first_ + 1;
@@ -68,6 +68,8 @@ class SharedTerm {
     }
   }
   bool is_on() const { return is_on_; }
+  // Nats by which it may outweigh the own scores.
+  double reach() const { return is_on_ ? GivenLabels::kReach : 0; }
 
   // The change of the term by edits, which must be filtered.
   double gain(std::span<const Edit<Filter>> edits) {

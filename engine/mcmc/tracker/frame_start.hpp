@@ -1,5 +1,5 @@
 // Initial state of the chain in a new frame: the exact assignment of its detections to predicted
-// tracks, or links given by the caller. Also finds the ambiguous links.
+// tracks, or the tracks of labels given by the caller and no others. Also finds the ambiguous links.
 //
 // The tracks are predicted and updated in blocks, on several threads. The results of the blocks are
 // merged in order, so they do not depend on the number of threads. The filter of the whole partition
@@ -28,7 +28,7 @@ class FrameStart {
  public:
   // A link is ambiguous if its log likelihood is within `ambiguous_within` nats of an alternative.
   FrameStart(bool has_assignment, double ambiguous_within, std::int32_t n_threads)
-      : has_assignment_(has_assignment), within_(ambiguous_within), n_threads_(n_threads) {}
+      : has_assignment_(has_assignment), ambiguous_within_(ambiguous_within), n_threads_(n_threads) {}
 
   // Forgets the labels given to the frames so far, as others are given to those to come.
   void forget_given() { before_.clear(); }
@@ -38,6 +38,7 @@ class FrameStart {
   void begin(Partition<Filter>& p, AmbiguousLinks& ambiguous, ChainStats& stats,
              std::int64_t& n_candidates) {
     ambiguous.add_frame();
+    within_ = ambiguous_within_ + (p.is_shared() ? GivenLabels::kReach : 0);
     list_ends(p);
     give_links(p, stats);
     list_candidates(p);
@@ -45,7 +46,7 @@ class FrameStart {
     const auto n_rows = static_cast<std::int32_t>(s_.rows.size());
     const auto n_columns = static_cast<std::int32_t>(s_.row_given.size());
     s_.match.assign(n_rows, -1);
-    s_.assignment.solve_groups(s_.candidates, n_columns, s_.match);
+    if (has_assignment_ && !is_given(p)) s_.assignment.solve_groups(s_.candidates, n_columns, s_.match);
     for (std::int32_t j = 0; j < n_columns; ++j)
       if (s_.row_given[j] >= 0) s_.match[s_.row_given[j]] = j;
     const auto& ids = p.window().frame(p.window().now()).ids;
@@ -55,7 +56,7 @@ class FrameStart {
           ambiguous.add(p.last(s_.rows[c.row]), ids[c.column]);
     for (std::int32_t r = 0; r < n_rows; ++r) {
       const std::int32_t j = s_.match[r];
-      if (j < 0 || s_.is_continued[r] || (!has_assignment_ && s_.row_given[j] != r)) continue;
+      if (j < 0 || s_.is_continued[r]) continue;
       Edit<Filter>& edit = next_edit();
       edit.track = s_.rows[r];
       edit.keep = p.track(edit.track).size();
@@ -100,6 +101,12 @@ class FrameStart {
     const bool is_listed =
         k >= 0 && p.last(k) == i && p.window().now() - p.window()[i].frame <= p.window().max_gap();
     return is_listed ? s_.row_of[k] : kNone;
+  }
+
+  // Whether labels are given to the newest frame.
+  static bool is_given(const Partition<Filter>& p) {
+    const auto& ids = p.window().frame(p.window().now()).ids;
+    return p.given() != nullptr && !ids.empty() && p.given()->covers(p.window()[ids.front()].number);
   }
 
   // Applies the given links. For each detection, stores the row of the track that it continues. The
@@ -289,7 +296,7 @@ class FrameStart {
   };
 
   bool has_assignment_;
-  double within_;  // ambiguous_within
+  double ambiguous_within_, within_ = 0;  // the latter with the reach of shared accelerations
   std::int32_t n_threads_;
   // The detections of each given label in the window.
   std::unordered_map<std::int64_t, std::vector<Given>> before_;

@@ -232,7 +232,8 @@ class MCMCDA(EngineMethod):
         model, n_axes, seed
             As for `Method.init`.
         start : array_like of int, shape (N,), optional
-            Initial labels of the detections to come, -1 for none, from which the chain starts.
+            Initial labels of the detections to come, -1 for a detection in no track. The chain
+            starts from their tracks, without links that the model excludes, and from no others.
         shared : SharedAcceleration, optional
             How the markers of the labels accelerate together. A track is of the marker whose label
             its first detection has, and the chain samples the posterior with `shared_gains`. Tracks
