@@ -6,8 +6,9 @@ from the detections of its marker in earlier frames, by the estimated model and 
 the same frame. How the markers accelerate together is learnt in every other second of the capture,
 and all is measured in the seconds between; a capture of less than four seconds has blocks of a
 quarter of it. The NIS is the squared error of an axis over its predicted variance, 1 in the mean if
-calibrated. Counted are detections whose marker was detected in both frames before, which count as
-known even where they are of another block.
+calibrated; the gain is what neighbours add to the log density of a detection (`shared_gains`).
+Counted are detections whose marker was detected in both frames before, which count as known even
+where they are of another block.
 
     python benchmarks/innovations.py [--data FOLDER] [--only NAME] [--markdown FILE]
 """
@@ -63,8 +64,8 @@ def by_own_motion(shared: SharedAcceleration) -> SharedAcceleration:
 
 def innovations(
     truth: am.Tracks, model: am.TrackingModel, shared: SharedAcceleration
-) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return the errors of the predictions, metres, and the NIS of an axis, where left out."""
+) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """Return the errors of the predictions, metres, the NIS of an axis, and the gains, nats."""
     d = truth.detections
     _, predicted = shared_densities(truth, model, shared)
     order, _ = truth.by_track
@@ -73,7 +74,8 @@ def innovations(
     own = order[in_a_row]
     own = own[is_left_out(d)[d.frame_of[own]] & np.isfinite(predicted[own, 0])]
     squares = ((d.points[own] - predicted[own, :-1]) ** 2).sum(axis=1)
-    return np.sqrt(squares), squares / d.n_axes / predicted[own, -1]
+    gains = am.model.shared_gains(truth, model, shared)
+    return np.sqrt(squares), squares / d.n_axes / predicted[own, -1], gains[own]
 
 
 def main() -> None:
@@ -94,14 +96,17 @@ def main() -> None:
                 ways += [(fitted[0], by_own_motion(shared)), (fitted[0], shared)]
             row = [path.name, rate]
             for each in ways:
-                errors, nis = innovations(truth, *each)
+                errors, nis, gains = innovations(truth, *each)
                 size = 1e3 * np.quantile(errors, [0.5, 0.99])
                 row += [f"{size[0]:.1f} / {size[1]:.0f}", f"{nis.mean():.2f}"]
-            rows.append(row + ["–"] * (2 + 2 * len(WAYS) - len(row)))
+            if fitted is not None:
+                row.append(f"{gains.mean():.2f}")
+            rows.append(row + ["–"] * (3 + 2 * len(WAYS) - len(row)))
             print(*rows[-1], sep=" | ", flush=True)
     head = ["capture", "rate"]
     for way in WAYS:
         head += [f"{way}: median / 99 %, mm", "NIS"]
+    head.append("gain, nats a detection")
     publish([*table(head, rows), "", f"{conditions()}."], options.markdown)
 
 

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     import asterism as am
 
 MOST, RIDGE = 6, 0.05
-FIELD, RIGID = (0.1, 0.5), (0.25, 1.0)
+FIELD, RIGID, WIDE = (0.1, 0.5), (0.25, 1.0), 8.0
+N = 11
 
 
 def log_sum(logs) -> float:
@@ -119,8 +120,8 @@ def carried(a, b, v, then, r: float):
 
 
 def densities(d, model, shared, labels, markers):
-    """Log densities (N, 10) of the detections of tracks, and moments of the mixture (N, D + 1)."""
-    found = np.full((d.n_points, 10), np.nan)
+    """Log densities (N, 11) of the detections of tracks, and moments of the mixture (N, D + 1)."""
+    found = np.full((d.n_points, N), np.nan)
     moments = np.full((d.n_points, d.n_axes + 1), np.nan)
     kind, F, Q = steps_of(model.motion, d.times)
     r, D = model.sensor.noise_sigma**2, d.n_axes
@@ -159,7 +160,7 @@ def densities(d, model, shared, labels, markers):
 def predictions(shared, marker, own, then, when, place, r):
     """The prediction by each component, or None."""
     s, t, is_moving = when
-    out: list[Modes | None] = [None] * 10
+    out: list[Modes | None] = [None] * N
     out[0] = own
     pairs, shape, arms = [], [], []
     for b in range(shared.offsets[marker], shared.offsets[marker + 1]):
@@ -175,24 +176,26 @@ def predictions(shared, marker, own, then, when, place, r):
         before = place(j, s - 1) if is_moving and t == s + 1 else None
         if before is not None:
             arms.append((was - then, now - 2 * was + before, shared.distances[b]))
+    if pairs or shape:
+        out[3] = Modes(own.log_w, own.at, WIDE * (own.P + r) - r)
     if arms:
         x, a, length = (np.array(each) for each in zip(*arms, strict=True))
         step, squares = field_at(x, a, float((length**2).mean()))
         for k, beta in enumerate(FIELD):
             variance = beta * own.variance(r)
             out[1 + k] = own.with_place(own.center(), variance)
-            out[3 + k] = own.with_place(own.center() + step, variance + 6 * r * squares)
+            out[4 + k] = own.with_place(own.center() + step, variance + 6 * r * squares)
     rigid = None
     if len(pairs) >= len(then):
         rigid = carried(*(np.array(each) for each in zip(*pairs, strict=True)), then, r)
         for k, factor in enumerate(RIGID):
-            out[5 + k] = own.with_place(rigid[0], factor * rigid[1])
+            out[6 + k] = own.with_place(rigid[0], factor * rigid[1])
     if len(shape) >= len(then):
         a, b, v = (np.array(each) for each in zip(*shape, strict=True))
-        formed = out[7] = own.with_place(*carried(a, b, v, shared.own_shape[marker], r))
+        formed = out[8] = own.with_place(*carried(a, b, v, shared.own_shape[marker], r))
         for k, factor in enumerate(RIGID):
             if rigid is not None:
-                out[8 + k] = formed.with_place(rigid[0], factor * rigid[1])
+                out[9 + k] = formed.with_place(rigid[0], factor * rigid[1])
     return out
 
 

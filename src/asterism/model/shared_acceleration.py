@@ -7,10 +7,10 @@ number:
     log π(ω) + Σ gain(y),  gain(y) = log Σ_c w_c p_c(y) - log p(y)
 
 p is the density by the marker's own motion, which `track_scores` has, and p_c are the `COMPONENTS`:
-that density, two with a smaller variance, and those in which the position is also predicted by the
-acceleration or by the rigid motion of neighbours (`engine/rigid/shared_acceleration.hpp` has the
-formulas). The weights w_c are learnt for each marker. Those of a marker that moves independently
-are of its own motion alone, the first `N_OWN`.
+that density, two with a smaller variance, one with a larger one for jolts, and those in which the
+position is also predicted by the acceleration or by the rigid motion of neighbours
+(`engine/rigid/shared_acceleration.hpp` has the formulas). The weights w_c are learnt for each
+marker. Those of a marker that moves independently are of its own motion alone, the first `N_OWN`.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 __all__ = ["COMPONENTS", "SharedAcceleration", "shared_gains"]
 
 COMPONENTS = (
-    "own", "still 0.1", "still 0.5", "field 0.1", "field 0.5", "rigid 0.25", "rigid 1", "shape",
-    "shape, rigid 0.25", "shape, rigid 1",
+    "own", "still 0.1", "still 0.5", "wide 8", "field 0.1", "field 0.5", "rigid 0.25", "rigid 1",
+    "shape", "shape, rigid 0.25", "shape, rigid 1",
 )  # fmt: skip
 """Predictions of a detection, with the factors of their variances.
 
@@ -44,6 +44,8 @@ own
     By the marker's own motion.
 still
     By it, and by no acceleration.
+wide
+    By it, with a larger variance.
 field
     By it, and by the acceleration of its neighbours: an affine field.
 rigid
@@ -51,7 +53,7 @@ rigid
 shape
     By it, and by the place of the marker in the shape of its neighbours.
 """
-N_OWN = 3
+N_OWN = 4
 """Number of the first components, which do not depend on neighbours."""
 
 
@@ -88,7 +90,7 @@ class SharedAcceleration:
     >>> model = am.estimate_model(truth.detections).model
     >>> shared = am.tracking.learn_shared_acceleration(truth, model)
     >>> shared
-    SharedAcceleration(53 markers, 704 bonds, 10 m/s² in common, weight of own motion 0.09)
+    SharedAcceleration(53 markers, 704 bonds, 10 m/s² in common, weight of own motion 0.10)
     """
 
     offsets: NDArray[np.int64]
