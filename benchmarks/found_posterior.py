@@ -2,10 +2,10 @@
 
 Hard captures and simulated fingers with 10 % missing, 10 % clutter and 0.3 mm of noise, at the full
 and at half the rate. `track` without a method tracks each as a whole, and MCMCDA searches from
-there. Tracks and truth are cut into pieces of 100 frames, and at gaps that the model excludes; the
-posterior is that of the model by which the tracks were made, alone and with the shared
-accelerations that are learnt from the found tracks. A track that the model excludes otherwise
-counts as clutter.
+there. Tracks and truth are cut into pieces of 100 frames, and at the gaps and speeds that the model
+excludes; the posterior is that of the model by which the tracks were made, alone and with the
+shared accelerations that are learnt from the found tracks. A track that the model excludes
+otherwise counts as clutter.
 
     python benchmarks/found_posterior.py [--data FOLDER] [--only NAME] [--markdown FILE]
 """
@@ -18,6 +18,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 import asterism as am
+from asterism.model.compiled import SPEED_MARGIN_SIGMAS
 from captures import captures, options_of_the_run
 from report import conditions, publish, table
 
@@ -35,15 +36,22 @@ SHARED_MOVES = 20
 
 
 def log_posterior(tracks: am.Tracks, model: am.TrackingModel) -> float:
-    """Return the log posterior of tracks, cut at the gaps that the model excludes."""
-    whole = within_gaps(tracks, model)
+    """Return the log posterior of tracks, cut at the gaps and speeds that the model excludes."""
+    whole = within_limits(tracks, model)
     scores = am.model.track_scores(whole, model)
     return float(scores[np.isfinite(scores)].sum())
 
 
-def within_gaps(tracks: am.Tracks, model: am.TrackingModel) -> am.Tracks:
-    """Return the pieces of tracks between the gaps that the model excludes."""
-    return am.metrics.oracle_tracks(tracks, model.population.max_gap)
+def within_limits(tracks: am.Tracks, model: am.TrackingModel) -> am.Tracks:
+    """Return the pieces of tracks between the gaps and the speeds that the model excludes."""
+    d, limits = tracks.detections, model.population
+    order, _ = tracks.by_track
+    label, at, time = tracks.labels[order], d.points[order], d.times[d.frame_of[order]]
+    reach = limits.max_speed * np.diff(time) + SPEED_MARGIN_SIGMAS * model.sensor.noise_sigma
+    begins = (label[1:] != label[:-1]) | (np.linalg.norm(np.diff(at, axis=0), axis=1) > reach)
+    labels = np.full(d.n_points, -1)
+    labels[order] = np.cumsum(np.append(False, begins))[: len(order)]
+    return am.metrics.oracle_tracks(am.Tracks(detections=d, labels=labels), limits.max_gap)
 
 
 def differences(found: am.Tracks, truth: am.Tracks, model: am.TrackingModel) -> NDArray[Any]:
@@ -64,7 +72,7 @@ def shared_gains(
     tracks: am.Tracks, model: am.TrackingModel, shared: SharedAcceleration, given: NDArray[Any]
 ) -> NDArray[Any]:
     """Return what shared accelerations add to each piece; a track is of its first given label."""
-    cut = within_gaps(tracks, model)
+    cut = within_limits(tracks, model)
     order, offsets = cut.by_track
     gains = am.model.shared_gains(cut, model, shared, given[order[offsets[:-1]]])
     frame_of = tracks.detections.frame_of
@@ -102,7 +110,7 @@ def main() -> None:
             assert found.recipe is not None
             model = am.tracking.tracklet_model(found.recipe.model)
             alone = am.track(
-                d, am.MCMCDA(), model=model, stitch=False, start=within_gaps(found, model)
+                d, am.MCMCDA(), model=model, stitch=False, start=within_limits(found, model)
             )
             shared = am.tracking.learn_shared_acceleration(found, model)
             method = am.MCMCDA(moves=SHARED_MOVES, end_odds=1.0, confidence=0)
