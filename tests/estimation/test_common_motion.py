@@ -82,6 +82,23 @@ def test_a_flat_cloud_is_never_mirrored():
         assert after == pytest.approx(before, abs=1e-12)
 
 
+@pytest.mark.parametrize("n_axes", [2, 3])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_turn_goes_on_for_as_long_as_a_frame_takes(n_axes, seed):
+    rng = np.random.default_rng(seed)
+    angle = 0.2 * np.minimum(np.arange(200) / 40, 1).cumsum()
+    R = np.tile(np.eye(n_axes), (200, 1, 1))
+    R[:, 0, 0] = R[:, 1, 1] = np.cos(angle)
+    R[:, 1, 0], R[:, 0, 1] = np.sin(angle), -np.sin(angle)
+    positions = np.einsum("tij,kj->tki", R, rng.uniform(-0.2, 0.2, (15, n_axes)))
+    kept = np.flatnonzero((rng.random(200) < 0.6) | (np.arange(200) < 45))
+    truth = am.Tracks.from_dense(kept / 100, positions[kept])
+    truth = am.simulate.corrupt(truth, missing=0.1, clutter=0.1, noise=1e-3, seed=1)
+    still = am.tracking.without_common_motion(truth.detections)
+    for k in range(15):
+        assert still.points[truth.labels == k].std(axis=0).max() < 2e-3
+
+
 def test_turns_do_not_grow_by_rounding_over_thousands_of_frames():
     rng = np.random.default_rng(3)
     positions = moved(rng.uniform(-0.2, 0.2, (8, 3)), 4000)

@@ -89,13 +89,15 @@ def without_common_motion(detections: Detections) -> Detections:
     >>> [f"{float(path.std(axis=0).max()):.4f}" for path in paths]
     ['0.5488', '0.0000']
     """
+    from scipy.linalg import fractional_matrix_power
+
     check_kind("detections", detections, Detections, "am.Detections.from_frames, or am.read")
     d, D = detections.measured(), detections.n_axes
     points = np.empty_like(d.points)
     if not len(points):
         return d
     turn, at = np.eye(D), np.median(d.points[: d.counts[d.counts > 0][0]], axis=0)
-    last_turn, velocity = np.eye(D), np.zeros(D)
+    last_turn, velocity, last_dt = np.eye(D), np.zeros(D), 1.0
     known = np.empty((0, D))
     unseen, is_begun = np.empty(0, dtype=np.int64), False
     for t in range(d.n_frames):
@@ -103,12 +105,15 @@ def without_common_motion(detections: Detections) -> Detections:
         y, before = d.points[own], (turn, at)
         dt = d.times[t] - d.times[t - 1]
         if len(known):
-            turn, at = last_turn @ turn, at + dt * velocity
+            ratio = round(float(dt / last_dt), 6)  # times are rounded
+            turn = fractional_matrix_power(last_turn, ratio).real @ turn
+            at = at + dt * velocity
         turn, at, ours, theirs, agreement = _fitted(y, known, turn, at)
         is_new = np.ones(len(y), dtype=bool)
         is_new[ours] = False
         if agreement >= LOST:
-            last_turn, velocity = turn @ before[0].T, (at - before[1]) / dt
+            last_turn, last_dt = turn @ before[0].T, dt
+            velocity = (at - before[1]) / dt
         elif len(y) < MIN_PAIRS:  # too few for a fit: the motion goes on while points are known
             is_new[:] = False
         else:  # lost: the points of this frame are the known ones
