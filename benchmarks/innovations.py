@@ -6,7 +6,7 @@ from the detections of its marker in earlier frames, by the estimated model and 
 the same frame. How the markers accelerate together is learnt in every other second of the capture,
 and all is measured in the seconds between; a capture of less than four seconds has blocks of a
 quarter of it. The NIS is the squared error of an axis over its predicted variance, 1 in the mean if
-calibrated; the gain is what neighbours add to the log density of a detection (`shared_gains`).
+calibrated; the gain is that of the log density of a detection over own motion (`shared_gains`).
 Counted are detections whose marker was detected in both frames before, which count as known even
 where they are of another block.
 
@@ -94,19 +94,18 @@ def main() -> None:
             if fitted is not None:
                 shared = learnt_elsewhere(truth, fitted[0])
                 ways += [(fitted[0], by_own_motion(shared)), (fitted[0], shared)]
-            row = [path.name, rate]
+            row, gain = [path.name, rate], "–"
             for each in ways:
                 errors, nis, gains = innovations(truth, *each)
                 size = 1e3 * np.quantile(errors, [0.5, 0.99])
                 row += [f"{size[0]:.1f} / {size[1]:.0f}", f"{nis.mean():.2f}"]
-            if fitted is not None:
-                row.append(f"{gains.mean():.2f}")
-            rows.append(row + ["–"] * (3 + 2 * len(WAYS) - len(row)))
+                gain = f"{gains.mean():.2f}"
+            rows.append(row + ["–"] * (2 + 2 * len(WAYS) - len(row)) + [gain])
             print(*rows[-1], sep=" | ", flush=True)
     head = ["capture", "rate"]
     for way in WAYS:
         head += [f"{way}: median / 99 %, mm", "NIS"]
-    head.append("gain, nats a detection")
+    head.append("gain over own motion, nats")
     publish([*table(head, rows), "", f"{conditions()}."], options.markdown)
 
 

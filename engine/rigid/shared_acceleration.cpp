@@ -48,7 +48,7 @@ void SharedAcceleration::with_neighbours(const PredictionByMode& own, const Link
   const std::size_t n_min = min_for_rotation(D_);
   PredictionByMode wide = own;
   for (int m = 0; m < own.M; ++m) wide.P[m] += (kWide - 1) * (own.P[m] + own.r);
-  out.set(kJolt, wide);
+  out.set(kWideAt, wide);
   if (sight.n_arms > 0) {
     const double n = static_cast<double>(sight.n_arms);
     const Field found = field({sight.arms.data(), sight.n_arms}, sight.squares / n, own.r);

@@ -6,9 +6,9 @@
 // of kComponents predictions, with weights that are learnt for each marker:
 //
 //   own    by the marker's own motion: ŷ_m with variance P_m + r in mode m
-//   wide   own, with kWide (P_m + r) for P_m + r: jolts of a marker that its neighbours do not share
 //   still  own, and the place ŷ with the variance β S, for two β: no acceleration. Where neighbours
 //          tell nothing, these are as good as the next ones.
+//   wide   own, with the variance kWide (P_m + r): jolts of a marker that its neighbours do not share
 //   field  own, and the acceleration of the segment at the marker. That of neighbour j is
 //          a_j = y_j(t) - 2 y_j(t-1) + y_j(t-2). An affine field is fitted to them:
 //            a(x) = c₀ + C x / (l √2),  Σ_j |a_j - a(x_j)|² + λ (|c₀|² + |C|²) minimal
@@ -70,9 +70,9 @@ class SharedAcceleration {
  public:
   static constexpr std::array<double, 2> kField{0.1, 0.5};   // β
   static constexpr std::array<double, 2> kRigid{0.25, 1};    // factors of the variance
-  static constexpr double kWide = 8;                         // the same
+  static constexpr double kWide = 8;                         // factor of the variance
   // Own, still, wide, field and rigid; then own and rigid with the shape.
-  static constexpr std::size_t kJolt = 1 + kField.size(), kStart = kJolt + 1;
+  static constexpr std::size_t kWideAt = 1 + kField.size(), kStart = kWideAt + 1;
   static constexpr std::size_t kTurn = kStart + kField.size();
   static constexpr std::size_t kShape = kTurn + kRigid.size();
   static constexpr std::size_t kComponents = kShape + 1 + kRigid.size();

@@ -273,7 +273,7 @@ class ChainRunner {
   // The plausible moves at ambiguous links, each with its cumulative weight.
   struct Hot {
     typename Sampler<Filter>::Listed move;
-    double gain = 0, upto = 0;  // the gain is an estimate at the start
+    double gain = 0, upto = 0;  // the gain is estimated at the start
   };
   std::vector<Hot> hot_;
   std::vector<std::int32_t> local_;

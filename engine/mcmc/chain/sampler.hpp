@@ -130,12 +130,15 @@ class Sampler {
     if (shared_.is_on() && move.gain > std::min(log_u, 0.0) - shared_.reach()) add_shared();
     return take(log_u, true, observe);
   }
-  // Estimates the gain of a move. Returns false if it is impossible or not above `min_gain`.
+  // Estimates the gain of a move; with a shared term it is exact. Returns false if the move is
+  // impossible or the gain not above `min_gain`.
   bool estimate(const Toggle& toggle, double min_gain, double& gain) {
-    if (!toggles_.propose(toggle, change_)) return false;
     change_.min_gain = min_gain - shared_.reach();
-    if (!(shared_.is_on() ? toggles_.weigh(change_) : toggles_.estimate(change_))) return false;
-    gain = change_.gain + (shared_.is_on() ? shared_.gain(change_.all()) : 0);
+    if (!toggles_.propose(toggle, change_) || !toggles_.estimate(change_)) return false;
+    gain = change_.gain;
+    if (!shared_.is_on()) return true;
+    if (!toggles_.weigh(change_)) return false;
+    gain = change_.gain + shared_.gain(change_.all());
     return gain > min_gain;
   }
   Random& random() { return random_; }

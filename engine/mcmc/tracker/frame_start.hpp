@@ -28,7 +28,7 @@ class FrameStart {
  public:
   // A link is ambiguous if its log likelihood is within `ambiguous_within` nats of an alternative.
   FrameStart(bool has_assignment, double ambiguous_within, std::int32_t n_threads)
-      : has_assignment_(has_assignment), ambiguous_within_(ambiguous_within), n_threads_(n_threads) {}
+      : has_assignment_(has_assignment), within_(ambiguous_within), n_threads_(n_threads) {}
 
   // Forgets the labels given to the frames so far, as others are given to those to come.
   void forget_given() { before_.clear(); }
@@ -38,7 +38,6 @@ class FrameStart {
   void begin(Partition<Filter>& p, AmbiguousLinks& ambiguous, ChainStats& stats,
              std::int64_t& n_candidates) {
     ambiguous.add_frame();
-    within_ = ambiguous_within_ + (p.is_shared() ? GivenLabels::kReach : 0);
     list_ends(p);
     give_links(p, stats);
     list_candidates(p);
@@ -296,7 +295,7 @@ class FrameStart {
   };
 
   bool has_assignment_;
-  double ambiguous_within_, within_ = 0;  // the latter with the reach of shared accelerations
+  double within_;  // ambiguous_within
   std::int32_t n_threads_;
   // The detections of each given label in the window.
   std::unordered_map<std::int64_t, std::vector<Given>> before_;

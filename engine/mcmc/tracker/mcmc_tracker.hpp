@@ -1,7 +1,8 @@
 // MCMC data association on a stream. The chain may change the associations of a window of frames;
 // older frames are settled.
 //
-// In each frame, the chain starts from the exact assignment of the detections to predicted tracks.
+// In each frame, the chain starts from the exact assignment of the detections to predicted tracks, or
+// from labels that are given.
 // The best partition found settles the frame that leaves the window. Only filter states of settled
 // frames are needed later, so frames older than the longest gap are removed.
 #pragma once
@@ -33,7 +34,7 @@ struct McmcOptions {
   std::int32_t block = 1;      // frames of a block
   double moves = 0;            // in each frame, per detection or per track, whichever is more
   double deadline = 0;         // seconds from the frame's arrival; 0: none
-  bool has_assignment = true;  // start from the exact assignment; else without new links
+  bool has_assignment = true;  // without labels, start from the exact assignment
   double confidence = 0;       // moves to estimate confidence, as above; 0: none
   std::int32_t n_chains = 1, n_threads = 1;
   SplitOptions split;
@@ -181,7 +182,7 @@ class McmcTracker {
     const auto allowed = [&](std::span<const Group> groups, double moves, double share) {
       return budgets(groups, moves, arrival, share);
     };
-    run_chains(sure.is_sure, allowed, 0, stats, [&] { return has_confidence() && !opt_.is_whole; });
+    if (opt_.moves > 0 || has_confidence()) run_chains(sure.is_sure, allowed, 0, stats, [&] { return has_confidence() && !opt_.is_whole; });
     stats.n_confirmed = p.tracks().size();
     stats.n_pending = p.free().size() + p.taken().size();
     total_.add(stats);
@@ -245,7 +246,10 @@ class McmcTracker {
     });
     Budgets out(weights, moves);
     if (opt_.deadline > 0) {
-      out.end_at(after(arrival, opt_.deadline * share), weights, opt_.n_chains, opt_.n_threads);
+      // Where markers accelerate together, groups are searched one after the other.
+      const std::int32_t n_threads =
+          partition().is_shared() ? std::min(opt_.n_threads, opt_.n_chains) : opt_.n_threads;
+      out.end_at(after(arrival, opt_.deadline * share), weights, opt_.n_chains, n_threads);
     }
     return out;
   }

@@ -54,7 +54,7 @@ shape
     By it, and by the place of the marker in the shape of its neighbours.
 """
 N_OWN = 4
-"""Number of the first components, which do not depend on neighbours."""
+"""Number of the first components: of own motion alone. Without a neighbour there is only "own"."""
 
 
 @record(eq=False)

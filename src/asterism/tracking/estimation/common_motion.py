@@ -106,7 +106,7 @@ def without_common_motion(detections: Detections) -> Detections:
         dt = d.times[t] - d.times[t - 1]
         if len(known):
             ratio = round(float(dt / last_dt), 6)  # times are rounded
-            turn = fractional_matrix_power(last_turn, ratio).real @ turn
+            turn = np.real(fractional_matrix_power(last_turn, ratio)) @ turn
             at = at + dt * velocity
         turn, at, ours, theirs, agreement = _fitted(y, known, turn, at)
         is_new = np.ones(len(y), dtype=bool)

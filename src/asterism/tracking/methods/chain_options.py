@@ -44,8 +44,8 @@ class ChainOptions:
         Whether the 2010 report's rules for the first tracks apply: only births without a track,
         and neither merge nor switch with a single track.
     assignment : bool
-        Whether the chain starts from the exact assignment of a new frame. Otherwise its detections
-        are initially in no track, as in the 2010 report.
+        Whether the chain starts from the exact assignment of a new frame to which no labels are
+        given. Otherwise its detections are initially in no track, as in the 2010 report.
     groups : {"likelihood", "clusters", "cells", "whole"}
         Groups of tracks and detections with separate chains. "likelihood" separates what no
         plausible link joins; "clusters" what is farther apart than `distance`; "cells" uses cells

@@ -41,12 +41,12 @@ FLOOR = 1e-4
 class MCMCDA(EngineMethod):
     """Markov chain Monte Carlo data association: sampling of the partitions of a window.
 
-    A move proposes a new partition and is accepted with the Metropolis-Hastings probability, so
-    the chain samples the posterior of partitions (`log_posterior`); the last moves of a search
-    accept hardly anything but gains. In each frame the chain starts from the exact assignment of
-    the new detections, and the best visited partition is kept. It decides the frame that leaves
-    the window. Of decided frames only the filter states of the tracks are kept, so the cost of a
-    frame does not grow with time.
+    A move proposes a new partition and is accepted with the Metropolis-Hastings probability, so the
+    chain samples the posterior of partitions (`log_posterior`); the last moves of a search accept
+    hardly anything but gains. In each frame the chain starts from the exact assignment of the new
+    detections, or from given labels, and the best visited partition is kept. It decides the frame
+    that leaves the window. Of decided frames only the filter states of the tracks are kept, so the
+    cost of a frame does not grow with time.
 
     Until a frame is decided its labels are those of the best partition so far, and can change.
 
@@ -80,6 +80,7 @@ class MCMCDA(EngineMethod):
         with several chains ``info["rhat"]`` measures the convergence of the confidence.
     threads : int
         Number of chains that run at the same time, 1 to 1024. The result does not depend on it.
+        With shared accelerations only the chains of the same group do.
     keep : {"best", "draw"}
         Partition of a chain that is kept: the best visited one, or the last one, which is drawn
         from the posterior of the open frames given the decided ones. Draws with different seeds
@@ -233,7 +234,8 @@ class MCMCDA(EngineMethod):
             As for `Method.init`.
         start : array_like of int, shape (N,), optional
             Initial labels of the detections to come, -1 for a detection in no track. The chain
-            starts from their tracks, without links that the model excludes, and from no others.
+            starts from their tracks, without links that the model or earlier moves exclude, and
+            from no others.
         shared : SharedAcceleration, optional
             How the markers of the labels accelerate together. A track is of the marker whose label
             its first detection has, and the chain samples the posterior with `shared_gains`. Tracks
