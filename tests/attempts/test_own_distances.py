@@ -62,7 +62,7 @@ def test_rounds_after_the_first_begin_with_tracks_that_were_stitched_again(monke
         begun.append(found.expected_right)
         return SimpleNamespace(**vars(found) | {"expected_right": min(found.expected_right + 1, 2)})
 
-    for step in ("_reassigned", "_with_lone_detections", "_with_lost_markers"):
+    for step in ("_reassigned", "_with_detections_in_gaps", "_with_lost_markers"):
         monkeypatch.setattr(own_distances, step, lambda found: found)
     monkeypatch.setattr(own_distances, "exchanged_by_spreads", lambda found: found)
     monkeypatch.setattr(own_distances, "_stitched_again", stitched_again)

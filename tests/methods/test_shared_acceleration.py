@@ -311,7 +311,36 @@ def test_mcmcda_keeps_fast_segments_apart_by_their_acceleration():
     assert scores[1] > scores[0] + 0.1
 
 
-def test_the_result_is_the_same_for_any_number_of_threads():
+@pytest.mark.parametrize(("n_frames", "seed"), [(60, 0), (60, 1), (140, 0), (140, 1)])
+def test_a_search_of_a_whole_capture_makes_it_more_probable(n_frames, seed):
+    """In one block, and in two: the posterior includes the neighbours before and after a block."""
+    rng = np.random.default_rng(seed)
+    places, _ = segments(rng, (6, 6), n_frames, jump=0.08, own=1e-3, turn=0.2)
+    places[:, 6:] += places[:, :1] - places[:, 6:7] + 0.15
+    truth = tracks_of(rng, places, missing=0.05)
+    model = small_model(
+        noise_sigma=1e-3, motion=am.DWNA(acceleration_sigma=15.0, velocity_sigma=1.0), max_speed=8.0
+    )
+    shared = am.tracking.learn_shared_acceleration(truth, model)
+
+    def posterior(labels):
+        found = am.Tracks(detections=truth.detections, labels=labels)
+        order, offsets = found.by_track
+        gains = am.model.shared_gains(found, model, shared, truth.labels[order[offsets[:-1]]])
+        return am.log_posterior(found, model) + gains.sum()
+
+    found = []
+    for moves in (0, 1, 20):
+        method = am.MCMCDA(window=None, moves=moves, end_odds=1, confidence=0)
+        state = method.init(model, seed=seed, start=truth.labels, shared=shared)
+        found.append(posterior(method.run(state, truth.detections)[1]))
+    assert found[0] == pytest.approx(posterior(truth.labels))
+    assert found[1] > found[0]
+    assert found[2] > found[1]
+
+
+@pytest.mark.parametrize("window", [10, None])
+def test_the_result_is_the_same_for_any_number_of_threads(window):
     rng = np.random.default_rng(8)
     places, _ = segments(rng, (6, 6), 60, jump=0.08, own=1e-3)
     truth = tracks_of(rng, places, missing=0.05)
@@ -321,7 +350,7 @@ def test_the_result_is_the_same_for_any_number_of_threads():
     shared = am.tracking.learn_shared_acceleration(truth, model)
     found = []
     for threads in (1, 2):
-        method = am.MCMCDA(moves=5, confidence=5, threads=threads, chains=2)
+        method = am.MCMCDA(window=window, moves=5, confidence=5, threads=threads, chains=2)
         state = method.init(model, seed=1, start=truth.labels, shared=shared)
         found.append(method.run(state, truth.detections)[1:])
     assert np.array_equal(found[0][0], found[1][0])
@@ -332,8 +361,6 @@ def test_mistakes_are_told():
     truth = am.simulate.person(frames=40, seed=1)
     model = am.estimate_model(truth.detections).model
     shared = am.tracking.learn_shared_acceleration(truth, model)
-    with pytest.raises(ParameterError, match="window"):
-        am.MCMCDA(window=None).init(model, start=truth.labels, shared=shared)
     with pytest.raises(ParameterError, match="one marker for each label"):
         am.MCMCDA().init(model, start=truth.labels + 1, shared=shared)
     with pytest.raises(ParameterError, match="shared"):

@@ -25,4 +25,11 @@ struct GivenLabels {
   std::int64_t of(std::int64_t number) const { return covers(number) ? labels[number - first] : -1; }
 };
 
+// A detection of a marker that is not in the partition and does not change.
+struct FixedPlace {
+  std::int32_t marker = 0;
+  std::int64_t frame = 0;
+  Point at{};
+};
+
 }  // namespace asterism

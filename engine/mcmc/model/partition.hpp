@@ -44,6 +44,9 @@ class Partition {
   const GivenLabels* given() const { return given_.get(); }
   // Whether markers accelerate together.
   bool is_shared() const { return given_ != nullptr && given_->shared != nullptr; }
+  // Sets detections of markers in the frames of the window that are not in it.
+  void fix(std::vector<FixedPlace> places) { fixed_ = std::move(places); }
+  const std::vector<FixedPlace>& fixed() const { return fixed_; }
   std::int64_t given_label(std::int32_t i) const { return given_->of(window_[i].number); }
   // The marker of a track, which is the label given to its first detection; -1 for none.
   std::int32_t marker(std::int32_t k) const {
@@ -232,11 +235,13 @@ class Partition {
     later_.set(i, std::move(later));
   }
   // Adds a track that begins, or continues earlier detections, with a settled one in a known state.
+  // Its marker is the label given to that one.
   std::int32_t add_settled(std::int32_t i, const State& state, bool has_others_before) {
     const std::int32_t k = new_track();
     free_.remove(i);
     adopt(k, i, state, 0);
     tracks_[k].n_gone = has_others_before;
+    tracks_[k].marker = marker_begun_by(i);
     return k;
   }
 
@@ -356,6 +361,7 @@ class Partition {
   DetectionWindow window_;
   std::shared_ptr<const std::vector<double>> log_end_;
   std::shared_ptr<const GivenLabels> given_;
+  std::vector<FixedPlace> fixed_;
   std::int64_t frozen_ = -1;
   std::int64_t n_after_ = 0;  // frames of the capture after the window
   Continuations<Filter> later_;

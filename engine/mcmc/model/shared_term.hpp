@@ -8,7 +8,8 @@
 //   own detections from the first change on, because it changes their filter
 //   other markers that have one of theirs as a neighbour in one of these frames
 //
-// Tracks of the whole partition that are not in the part are fixed: the term is conditional on them.
+// Tracks of the whole partition that are not in the part are fixed, as are its fixed places: the term
+// is conditional on them.
 // A marker with detections of two tracks in a frame has no place there.
 #pragma once
 
@@ -58,6 +59,7 @@ class SharedTerm {
     if (!is_on_) return;
     known_inside_.assign(part.window().n_ids(), kUnknown);
     known_outside_.assign(whole.window().n_ids(), kUnknown);
+    for (const FixedPlace& one : whole.fixed()) slot(one.marker, one.frame).push_back(one.at);
     for (const std::int32_t k : whole.tracks().items()) {
       const std::int32_t marker = whole.marker(k);
       if (marker < 0) continue;

@@ -13,6 +13,9 @@
 // capture's log posterior by a move is therefore that of its block. Blocks overlap by half, so each
 // link is well inside one of them. The cost of a move does not depend on the length of the capture.
 //
+// With given labels of markers that accelerate together, the detections of markers before and after
+// the block, which are not in it, are fixed places.
+//
 // Tracks are stored as links between detections, which are numbered in order of arrival.
 #pragma once
 
@@ -63,6 +66,8 @@ class CaptureSweep {
   void add_ambiguous(std::int64_t from, std::int64_t to) {
     ambiguous_.back().push_back({static_cast<std::int32_t>(from), static_cast<std::int32_t>(to)});
   }
+  // Sets labels by which tracks are of markers that accelerate together.
+  void give(std::shared_ptr<const GivenLabels> given) { given_ = std::move(given); }
   void set_label(std::int64_t detection, std::int64_t label) { labels_[detection] = label; }
 
   // Links the detections according to the labels.
@@ -109,6 +114,7 @@ class CaptureSweep {
     const std::int64_t to = std::min(block.last + std::max<std::int64_t>(kAfter, max_gap_), T - 1);
     p.close_after(block.is_last ? T : block.last - from, T - 1 - to);
     local_.clear();
+    if (given_ != nullptr) give_labels(block, from, to, p);
     std::vector<std::int32_t> some;
     std::vector<Point> places;
     for (std::int64_t t = from; t <= to; ++t) {
@@ -119,7 +125,7 @@ class CaptureSweep {
           some.push_back(i);
           places.push_back(points_[i]);
         }
-      const auto ids = p.add_frame(frames_[t].time, frames_[t].step, places, frames_[t].begin);
+      const auto ids = p.add_frame(frames_[t].time, frames_[t].step, places, part.numbers.size());
       for (std::size_t n = 0; n < some.size(); ++n) {
         local_[some[n]] = ids[n];
         part.numbers.push_back(some[n]);
@@ -188,6 +194,30 @@ class CaptureSweep {
     std::int32_t begin = 0;  // number of its first detection
   };
 
+  // Sets the labels of a block's detections, in their order, and the fixed places. Before the block
+  // the label is that of the marker.
+  void give_labels(const Block& block, std::int64_t from, std::int64_t to, Partition<Filter>& p) {
+    // Links from the first half of the block before on may have changed.
+    list_markers(std::max<std::int64_t>(block.first - n_block_ / 2, 0), to);
+    GivenLabels own{0, {}, given_->shared};
+    std::vector<FixedPlace> fixed;
+    for (std::int64_t t = from; t <= to; ++t)
+      for (std::int32_t i = frames_[t].begin; i < end_of(t); ++i)
+        if (belongs(block, t, i))
+          own.labels.push_back(t < block.first ? markers_[i] : given_->of(i));
+        else if (markers_[i] != kNone)
+          fixed.push_back({markers_[i], t - from, points_[i]});
+    p.give(std::make_shared<const GivenLabels>(std::move(own)));
+    p.fix(std::move(fixed));
+  }
+  // Lists the markers of tracks in frames; those of earlier ones are known.
+  void list_markers(std::int64_t first, std::int64_t last) {
+    markers_.resize(points_.size(), kNone);
+    for (std::int32_t i = frames_[first].begin; i < end_of(last); ++i)
+      markers_[i] = before_[i] != kNone  ? markers_[before_[i]]
+                    : after_[i] != kNone ? static_cast<std::int32_t>(given_->of(i))
+                                         : kNone;
+  }
   std::int32_t n_points() const { return static_cast<std::int32_t>(points_.size()); }
   std::int32_t end_of(std::int64_t t) const {
     return t + 1 < static_cast<std::int64_t>(frames_.size()) ? frames_[t + 1].begin : n_points();
@@ -252,6 +282,8 @@ class CaptureSweep {
   std::vector<std::int64_t> labels_, found_;  // initial and final
   std::vector<std::vector<Link>> ambiguous_;  // by the frame they lead into
   std::vector<std::int32_t> before_, after_;
+  std::shared_ptr<const GivenLabels> given_;
+  std::vector<std::int32_t> markers_;  // by detection, -1 for none
   // At the start of the next block.
   std::unordered_map<std::int32_t, typename Filter::State> states_;
   std::unordered_map<std::int32_t, std::int32_t> local_;  // local numbers, while the block is taken

@@ -84,6 +84,7 @@ class McmcTracker {
     if (so_far_.n_seen == 0) return;
     SampledStats stats;
     sweep_.link_labels();
+    if (partition_.is_shared()) sweep_.give(given_);
     std::vector<double> sure(has_confidence() ? so_far_.n_seen : 0, 1.0);
     const auto blocks = sweep_.blocks();
     const double overlap = sweep_.overlap();
@@ -126,8 +127,9 @@ class McmcTracker {
   // Sets labels whose links the coming frames start from, if the model allows them.
   // With `shared`, the labels are also those of its markers.
   void start_from(std::vector<std::int64_t> labels, std::shared_ptr<const SharedAcceleration> shared) {
-    partition_.give(std::make_shared<const GivenLabels>(
-        GivenLabels{so_far_.n_seen, std::move(labels), std::move(shared)}));
+    given_ = std::make_shared<const GivenLabels>(
+        GivenLabels{so_far_.n_seen, std::move(labels), std::move(shared)});
+    partition_.give(given_);
     start_.forget_given();
   }
 
@@ -182,7 +184,12 @@ class McmcTracker {
     const auto allowed = [&](std::span<const Group> groups, double moves, double share) {
       return budgets(groups, moves, arrival, share);
     };
-    if (opt_.moves > 0 || has_confidence()) run_chains(sure.is_sure, allowed, 0, stats, [&] { return has_confidence() && !opt_.is_whole; });
+    // Where markers accelerate together, a whole capture is searched at the end alone: the chains of
+    // a window do not know where the others will be.
+    const bool is_searched_now = !opt_.is_whole || !p.is_shared();
+    if (is_searched_now && (opt_.moves > 0 || has_confidence()))
+      run_chains(sure.is_sure, allowed, 0, stats,
+                 [&] { return has_confidence() && !opt_.is_whole; });
     stats.n_confirmed = p.tracks().size();
     stats.n_pending = p.free().size() + p.taken().size();
     total_.add(stats);
@@ -353,6 +360,7 @@ class McmcTracker {
   }
 
   Partition<Filter> partition_;
+  std::shared_ptr<const GivenLabels> given_;
   McmcOptions opt_;
   std::uint64_t seed_;
   FrameStart<Filter> start_;

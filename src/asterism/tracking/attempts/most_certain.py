@@ -12,7 +12,12 @@ from typing import TYPE_CHECKING, Any
 from asterism.tracking.attempts.agreed import until_agreed
 from asterism.tracking.attempts.attempt import attempt, next_pass
 from asterism.tracking.attempts.halves import Halves
-from asterism.tracking.attempts.own_distances import assigned_again, refined_by_own_distances
+from asterism.tracking.attempts.own_distances import (
+    assigned_again,
+    has_own_distances,
+    refined_by_own_distances,
+    searched_again,
+)
 from asterism.tracking.attempts.uncorrected import DOUBTFUL, Uncorrected
 from asterism.tracking.estimation import (
     OVER_THREE_FRAMES,
@@ -32,6 +37,8 @@ __all__ = ["carried_out", "most_certain"]
 
 MAX_PASSES = 4
 """Largest number of passes over the capture."""
+MAX_SEARCHES = 2
+"""Largest number of searches with shared accelerations."""
 
 
 def carried_out(
@@ -106,6 +113,7 @@ def most_certain(
             best = _more_certain(best, assigned_again(bodies), 0)
     else:
         best = assigned_again(refined_by_own_distances(first))
+    best = _after_searches(best, parts.next)
     if best.is_doubtful and is_first and not recipe.common_motion:
         still = _attempt_without_common_motion(recipe, detections, parts.next())
         if still is not None:
@@ -122,6 +130,26 @@ def _after_passes(best: Uncorrected, begin: Callable[[], Callable[[int], Any]]) 
             break
         best = again
     return best
+
+
+def _after_searches(best: Uncorrected, begin: Callable[[], Callable[[int], Any]]) -> Uncorrected:
+    """Search with shared accelerations from the best tracks, while identities become more certain.
+
+    Since a search takes detections into tracks, fewer of all must be expected to be wrong, too.
+    """
+    n = 0
+    while best.is_doubtful and n < MAX_SEARCHES and has_own_distances(best):
+        again = searched_again(best, begin())
+        if (
+            again.expected_right <= best.expected_right
+            or again.expected_wrong > best.expected_wrong
+        ):
+            break
+        best, n = again, n + 1
+    if n == 0:
+        return best
+    tracks = dataclasses.replace(best.tracks, info={**best.tracks.info, "searches": n})
+    return dataclasses.replace(best, tracks=tracks)
 
 
 def _by(

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from asterism.metrics import oracle_tracks
-from asterism.tracking.attempts.lone import with_lone_detections
+from asterism.tracking.attempts.in_gaps import with_detections_in_gaps
 from asterism.tracking.attempts.lost import with_lost_markers
+from asterism.tracking.attempts.shared_search import searched_with_shared_accelerations
 from asterism.tracking.confidence.identity import OTHER_JOIN
 from asterism.tracking.confidence.reassign import ghost_log_odds, reassigned
 from asterism.tracking.naming import learn_marker_set, name_tracks
@@ -17,6 +18,8 @@ from asterism.tracking.stitching import stitch
 from asterism.tracking.stitching.exchanged import exchanged_back, with_markers
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from asterism.tracking.attempts.uncorrected import Uncorrected
@@ -47,8 +50,7 @@ def refined_by_own_distances(found: Uncorrected) -> Uncorrected:
     """
     tracks = found.tracks
     is_present = tracks.lengths >= PRESENT * tracks.detections.n_frames
-    n_cells = tracks.detections.n_frames * tracks.n_tracks
-    if int(is_present.sum()) not in MARKERS or n_cells > MAX_CELLS:
+    if not has_own_distances(found):
         return found
     names = tuple(f"M{k}" if own else None for k, own in enumerate(is_present))
     named, best = dataclasses.replace(tracks, names=names), found
@@ -61,6 +63,19 @@ def refined_by_own_distances(found: Uncorrected) -> Uncorrected:
             break
         best = renamed
     return best
+
+
+def has_own_distances(found: Uncorrected) -> bool:
+    """Return whether a marker set can be learnt from tracks by itself.
+
+    Parameters
+    ----------
+    found : Uncorrected
+        Tracks without names.
+    """
+    tracks = found.tracks
+    n_present = int((tracks.lengths >= PRESENT * tracks.detections.n_frames).sum())
+    return n_present in MARKERS and tracks.detections.n_frames * tracks.n_tracks <= MAX_CELLS
 
 
 def assigned_again(found: Uncorrected) -> Uncorrected:
@@ -79,7 +94,7 @@ def assigned_again(found: Uncorrected) -> Uncorrected:
     best, is_stitched_again = found, False
     for n in range(MAX_ROUNDS):
         begun = best if n == 0 else _stitched_again(best)
-        again = _with_lost_markers(_with_lone_detections(_reassigned(begun)))
+        again = _with_lost_markers(_with_detections_in_gaps(_reassigned(begun)))
         again = exchanged_by_spreads(again)
         if n > 0 and again.expected_right <= best.expected_right:
             break
@@ -136,10 +151,10 @@ def _reassigned(found: Uncorrected) -> Uncorrected:
     return best
 
 
-def _with_lone_detections(found: Uncorrected) -> Uncorrected:
+def _with_detections_in_gaps(found: Uncorrected) -> Uncorrected:
     if found.stitching is None:
         return found
-    stitching = with_lone_detections(found.stitching, found.model)
+    stitching = with_detections_in_gaps(found.stitching, found.model)
     tracks = dataclasses.replace(stitching.tracks, recipe=found.tracks.recipe)
     return dataclasses.replace(found, tracks=tracks, stitching=stitching)
 
@@ -152,6 +167,24 @@ def _with_lost_markers(found: Uncorrected) -> Uncorrected:
     noise_sigma = found.model.sensor.noise_sigma
     labels = with_lost_markers(tracks.detections, tracks.labels, noise_sigma)
     return _with_labels(found, labels, int(tracks.info.get("refinements", 0)))
+
+
+def searched_again(found: Uncorrected, progress: Callable[[int], Any] | None) -> Uncorrected:
+    """Search with the shared accelerations of the tracks, and assign all detections once more.
+
+    Parameters
+    ----------
+    found : Uncorrected
+        Tracks without names, `assigned_again`.
+    progress : callable, optional
+        Called with the number of finished frames of the search.
+    """
+    labels = searched_with_shared_accelerations(
+        found.tracks, found.model, seed=found.recipe.seed,
+        threads=found.recipe.options.get("threads", 1), progress=progress,
+    )  # fmt: skip
+    n_refined = int(found.tracks.info.get("refinements", 0))
+    return assigned_again(refined_by_own_distances(_with_labels(found, labels, n_refined)))
 
 
 def exchanged_by_spreads(found: Uncorrected) -> Uncorrected:

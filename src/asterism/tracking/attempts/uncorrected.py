@@ -98,6 +98,11 @@ class Uncorrected:
         return expected_right(self.tracks, self.examined)
 
     @property
+    def expected_wrong(self) -> float:
+        """Number of detections with a track whose identity is expected to be wrong."""
+        return int((self.tracks.labels >= 0).sum()) - self.expected_right
+
+    @property
     def has_bonds(self) -> bool:
         """Whether the method used the distances between markers."""
         return self.recipe.options.get("rigid") is not None
@@ -105,5 +110,4 @@ class Uncorrected:
     @property
     def is_doubtful(self) -> bool:
         """Whether more than `DOUBTFUL` of the detections are expected to be wrong."""
-        labels = self.tracks.labels
-        return int((labels >= 0).sum()) - self.expected_right > DOUBTFUL * len(labels)
+        return self.expected_wrong > DOUBTFUL * len(self.tracks.labels)

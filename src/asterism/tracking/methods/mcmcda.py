@@ -250,7 +250,7 @@ class MCMCDA(EngineMethod):
         ------
         ParameterError
             If no track can start, neither by a move nor from a label, or `shared` is without labels
-            or of others, or for ``window=None``.
+            or of others.
 
         Examples
         --------
@@ -280,8 +280,6 @@ class MCMCDA(EngineMethod):
         if shared is None:
             return None
         check_kind("shared", shared, SharedAcceleration, "am.tracking.learn_shared_acceleration(…)")
-        if self.window is None:
-            raise ParameterError("window", "a number of frames with shared accelerations", "None")
         K = len(shared.weights)
         if labels.max(initial=-1) >= K:
             raise ParameterError(

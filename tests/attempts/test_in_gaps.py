@@ -1,4 +1,4 @@
-"""Lone detections in gaps of one frame."""
+"""Detections without a track in the gaps of tracks."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import asterism as am
-from asterism.tracking.attempts.lone import with_lone_detections
+from asterism.tracking.attempts.in_gaps import with_detections_in_gaps
 
 CUBE = am.simulate.corrupt(am.simulate.cube(frames=60, seed=1), noise=3e-4, seed=1)
 TRUTH = am.Tracks.from_dense(CUBE.detections.times, CUBE.positions())
@@ -42,21 +42,21 @@ def missed(*offsets):
         ([[0, 0.01, 0]], [0]),  # a jolt
         ([[0, 0.3, 0]], []),  # far
         ([[0, 0.01, 0], [0, 0, 0.002]], [1]),  # the nearer of two
-        ([[0, 0.002, 0], [0, 0.002, 0]], [0]),  # one of two at the same place
+        ([[0, 0.002, 0], [0, 0.002, 0]], []),  # neither of two at the same place
     ],
 )
 def test_the_nearest_detection_in_a_gap_of_one_frame_is_taken(offsets, taken):
     before = missed(*offsets)
-    found = with_lone_detections(before, MODEL)
+    found = with_detections_in_gaps(before, MODEL)
     expected = before.tracks.labels.copy()
     expected[FIRST + np.array(taken, dtype=int)] = expected[0]
     np.testing.assert_array_equal(found.tracks.labels, expected)
     np.testing.assert_array_equal(found.tracklets >= 0, expected >= 0)
-    assert found.tracks.info["lone"] == len(taken)
+    assert found.tracks.info["in_gaps"] == len(taken)
     assert found.joins == before.joins == ()
-    again = with_lone_detections(found, MODEL)
+    again = with_detections_in_gaps(found, MODEL)
     np.testing.assert_array_equal(again.tracks.labels, expected)
-    assert again.tracks.info["lone"] == len(taken)
+    assert again.tracks.info["in_gaps"] == len(taken)
 
 
 def test_a_detection_between_two_gaps_is_taken_by_the_nearer_track():
@@ -64,26 +64,67 @@ def test_a_detection_between_two_gaps_is_taken_by_the_nearer_track():
     labels[FIRST : FIRST + 2] = -1
     points[FIRST] += 0.05 * (points[FIRST + 1] - points[FIRST])
     points[FIRST + 1] += 1
-    found = with_lone_detections(stitched(labels, points), MODEL).tracks
+    found = with_detections_in_gaps(stitched(labels, points), MODEL).tracks
     assert found.labels[FIRST : FIRST + 2].tolist() == [found.labels[0], -1]
 
 
-def test_detections_of_ghosts_and_in_longer_gaps_are_not_taken():
+def test_detections_of_ghosts_are_not_taken():
     before = missed([0, 0, 0])
     tracklets = before.tracklets.copy()
     tracklets[FIRST] = tracklets.max() + 1
     ghost = dataclasses.replace(before, tracklets=tracklets)
-    assert with_lone_detections(ghost, MODEL).tracks.info["lone"] == 0
-    labels = TRUTH.labels.copy()
-    labels[[FIRST, FIRST + N]] = -1
-    assert with_lone_detections(stitched(labels), MODEL).tracks.info["lone"] == 0
+    assert with_detections_in_gaps(ghost, MODEL).tracks.info["in_gaps"] == 0
+
+
+@pytest.mark.parametrize(("rate", "taken"), [(100, True), (2, False)])
+def test_gaps_of_several_frames_are_filled_up_to_a_second(rate, taken):
+    """The body tells where a marker is in the middle of a gap."""
+    truth = am.simulate.corrupt(am.simulate.cube(frames=60, rate=rate, seed=1), noise=3e-4, seed=1)
+    truth = am.Tracks.from_dense(truth.detections.times, truth.positions())
+    d, labels = truth.detections, truth.labels.copy()
+    gone = [(AT + n) * N for n in range(5)]  # the third is detected, and far from a straight line
+    points = d.points.copy()
+    points[[each for n, each in enumerate(gone) if n != 2]] += 5
+    labels[gone] = -1
+    changed = am.Tracks(detections=dataclasses.replace(d, points=points), labels=labels)
+    model = am.estimate_model(d).model
+    found = with_detections_in_gaps(am.stitch(changed, model), model).tracks
+    expected = labels.copy()
+    expected[gone[2]] = 0 if taken else -1
+    assert found.labels[FIRST - N] == 0
+    np.testing.assert_array_equal(found.labels, expected)
+
+
+def test_a_ghost_is_not_taken_where_there_are_many():
+    """Where each marker has ghosts, a detection at the same distance is as likely one of them."""
+    d, taken = TRUTH.detections, []
+    for n_ghosts in (0, 3):
+        rng = np.random.default_rng(1)
+        at, labels = [], []
+        for t in range(d.n_frames):
+            own = d.points[t * N : (t + 1) * N].copy()
+            mine = np.arange(N)
+            if t == AT:
+                own[0] += [0, 0.01, 0]
+                mine[0] = -1
+            ghosts = rng.normal(0, 0.02, (n_ghosts, N, 3)) + own
+            at += [own, *ghosts]
+            labels += [mine, np.full(n_ghosts * N, -1)]
+        counts = np.full(d.n_frames, N * (1 + n_ghosts))
+        many = am.Detections(
+            times=d.times, offsets=np.append(0, np.cumsum(counts)), points=np.concatenate(at)
+        )
+        tracks = am.Tracks(detections=many, labels=np.concatenate(labels))
+        found = with_detections_in_gaps(am.stitch(tracks, MODEL), MODEL).tracks
+        taken.append(int(found.labels[AT * N * (1 + n_ghosts)]))
+    assert taken == [0, -1]
 
 
 def test_the_probability_is_the_confidence_of_the_detection():
     before = missed([0, 0.01, 0])
     confidence = np.where(before.tracks.labels >= 0, 1.0, 0.0)
     tracks = dataclasses.replace(before.tracks, confidence=confidence)
-    found = with_lone_detections(dataclasses.replace(before, tracks=tracks), MODEL)
+    found = with_detections_in_gaps(dataclasses.replace(before, tracks=tracks), MODEL)
     assert 0.98 < found.tracks.confidence[FIRST] < 1
 
 
@@ -92,9 +133,9 @@ def test_only_certain_detections_are_taken():
     for off in np.linspace(0, 0.3, 31):
         before = missed([0, off, 0])
         tracks = dataclasses.replace(before.tracks, confidence=np.ones(len(TRUTH.labels)))
-        found = with_lone_detections(dataclasses.replace(before, tracks=tracks), MODEL).tracks
+        found = with_detections_in_gaps(dataclasses.replace(before, tracks=tracks), MODEL).tracks
         taken.append(found.labels[FIRST] >= 0)
-        assert not taken[-1] or found.confidence[FIRST] > 0.98
+        assert not taken[-1] or found.confidence[FIRST] > 0.997
     assert any(taken)
     assert not all(taken)
 
