@@ -4,8 +4,8 @@ Hard captures and simulated fingers with 10 % missing, 10 % clutter and 0.3 mm o
 and at half the rate. `track` without a method tracks each as a whole, and MCMCDA searches from
 there. Tracks and truth are cut into pieces of 100 frames, and at the gaps and speeds that the model
 excludes; the posterior is that of the model by which the tracks were made, alone and with the
-shared accelerations that are learnt from the found tracks. A track that the model excludes
-otherwise counts as clutter.
+shared accelerations that are learnt from the found tracks, with which MCMCDA searches over the
+whole capture. A track that the model excludes otherwise counts as clutter.
 
     python benchmarks/found_posterior.py [--data FOLDER] [--only NAME] [--markdown FILE]
 """
@@ -113,7 +113,7 @@ def main() -> None:
                 d, am.MCMCDA(), model=model, stitch=False, start=within_limits(found, model)
             )
             shared = am.tracking.learn_shared_acceleration(found, model)
-            method = am.MCMCDA(moves=SHARED_MOVES, end_odds=1.0, confidence=0)
+            method = am.MCMCDA(window=None, moves=SHARED_MOVES, end_odds=1.0, confidence=0)
             state = method.init(model, n_axes=d.n_axes, start=found.labels, shared=shared)
             _, labels, _ = method.run(state, d)
             together = am.Tracks(detections=d, labels=labels)

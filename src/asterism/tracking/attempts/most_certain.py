@@ -81,10 +81,11 @@ def most_certain(
     with bonds must be more certain by `DOUBTFUL`, because it uses distances as the confidence does.
     Then further passes follow (`next_pass`), until one is not more certain. The best is
     `assigned_again`. If it has bonds and identities are still uncertain, so is an attempt with the
-    motion in tracks of single frames, and the more certain of both is the result. If that is still
-    uncertain, and detections are more probable without the motion that most markers have in common,
-    all this is done without it, which must be more certain by `DOUBTFUL`. For `progress`, the first
-    method is half of the work, and every other attempt or pass half of what is left.
+    motion in tracks of single frames, and the more certain of both is the result. It is
+    `searched_again` while it is uncertain. If it still is, and detections are more probable without
+    the motion that most markers have in common, all this is done without it, which must be more
+    certain by `DOUBTFUL`. For `progress`, the first method is half of the work, and every other
+    attempt, pass or search half of what is left.
 
     Parameters
     ----------
@@ -135,7 +136,8 @@ def _after_passes(best: Uncorrected, begin: Callable[[], Callable[[int], Any]]) 
 def _after_searches(best: Uncorrected, begin: Callable[[], Callable[[int], Any]]) -> Uncorrected:
     """Search with shared accelerations from the best tracks, while identities become more certain.
 
-    Since a search takes detections into tracks, fewer of all must be expected to be wrong, too.
+    A search also takes detections into tracks, each of which adds to the sum. So fewer of all must
+    be expected to be wrong, too.
     """
     n = 0
     while best.is_doubtful and n < MAX_SEARCHES and has_own_distances(best):

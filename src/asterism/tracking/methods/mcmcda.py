@@ -240,7 +240,8 @@ class MCMCDA(EngineMethod):
             How the markers of the labels accelerate together. A track is of the marker whose label
             its first detection has, and the chain samples the posterior with `shared_gains`. Tracks
             of another group of the same frame are fixed meanwhile. A move whose own scores are more
-            than 30 nats too small is rejected unseen.
+            than 30 nats too small is rejected unseen. A whole capture is searched in blocks, given
+            the markers before and after each.
 
         Returns
         -------
