@@ -31,3 +31,8 @@ def test_it_is_not_below_that_of_the_model():
     truth = am.simulate.cube(frames=20, seed=1)
     model = small_model(clutter_density=0.7)
     assert with_clutter_near_markers(model, truth) == model
+
+
+def test_no_frames_have_no_ghosts():
+    none = am.Tracks(detections=am.Detections.from_frames([], []), labels=[])
+    assert with_clutter_near_markers(small_model(), none) == small_model()

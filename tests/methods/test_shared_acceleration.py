@@ -342,7 +342,7 @@ def test_a_search_of_a_whole_capture_makes_it_more_probable(n_frames, seed):
 @pytest.mark.parametrize("window", [10, None])
 def test_the_result_is_the_same_for_any_number_of_threads(window):
     rng = np.random.default_rng(8)
-    places, _ = segments(rng, (6, 6), 60, jump=0.08, own=1e-3)
+    places, _ = segments(rng, (6, 6), 60 if window else 140, jump=0.08, own=1e-3)
     truth = tracks_of(rng, places, missing=0.05)
     model = small_model(
         noise_sigma=1e-3, motion=am.DWNA(acceleration_sigma=15.0, velocity_sigma=1.0), max_speed=8.0

@@ -14,7 +14,9 @@
 // link is well inside one of them. The cost of a move does not depend on the length of the capture.
 //
 // With given labels of markers that accelerate together, the detections of markers before and after
-// the block, which are not in it, are fixed places.
+// the block, which are not in it, are fixed places. Terms of detections after the block are not in its
+// score: those of continuing tracks, whose marker may change, and of neighbours in the two frames that
+// follow. They are in that of the next block.
 //
 // Tracks are stored as links between detections, which are numbered in order of arrival.
 #pragma once

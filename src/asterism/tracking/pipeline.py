@@ -128,8 +128,9 @@ def track(
         score by which methods are compared (`log_posterior`);
         stitched tracks have none, because the model excludes gaps of that length.
         ``info["refinements"]`` tells how often tracks whose identities were uncertain have been
-        named by a marker set learnt from them, and ``info["lone"]`` how many detections were taken
-        into gaps of one frame. The rest of ``info`` depends on the method.
+        named by a marker set learnt from them, ``info["searches"]`` how many searches with shared
+        accelerations were kept, and ``info["in_gaps"]`` how often a detection was taken into a gap.
+        The rest of ``info`` depends on the method.
 
     Raises
     ------

@@ -15,8 +15,6 @@ from asterism.tracking.filling.scores import settle
 from asterism.tracking.filling.spans import Span, find_gaps
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from numpy.typing import NDArray
 
     from asterism.model import TrackingModel, Tracks
@@ -32,8 +30,10 @@ ENOUGH = 6.0
 LEAD = 3.0
 """Log odds by which it must exceed those of others for the gap, and of other gaps for it."""
 MARGIN = 2.0
-"""Factor of the largest deviation of a track from straight lines of the length of a gap. Detections
-within are compared with its fill, as are those that a fill as precise as the sensor might reach."""
+"""Factor of the largest deviation of a track from straight lines of the length of a gap, within
+which detections are compared with its fill; but at least the distance of `_reach`."""
+MAX_GAPS = 3000
+"""Largest number of gaps that are filled; each takes some milliseconds."""
 MAX_LINES = 400
 """Number of such lines, spread over the capture."""
 MAX_CELLS = 30_000_000
@@ -94,6 +94,8 @@ def _clear(
     """Return detections that are clearly in a gap, those before the gap, and the log odds."""
     tracks, d = found.tracks, found.tracks.detections
     free = np.flatnonzero(found.tracklets < 0)
+    if not len(free):
+        return free, free, np.empty(0)
     dense = DenseTracks(times=d.times, positions=tracks.positions(), model=model)
     model = with_clutter_near_markers(model, tracks)
     at, track, log_odds, before = [free[:0]], [free[:0]], [np.empty(0)], [free[:0]]
@@ -122,28 +124,36 @@ def _compared(
     free: NDArray[np.int64],
     points: NDArray[np.float64],
     frame_of: NDArray[np.int64],
-    least: float,
-) -> Iterator[tuple[Span, NDArray[np.int64]]]:
-    """Find gaps of a frame, or of `LONGEST`, each with the free detections near a line through it.
+    min_reach: float,
+) -> list[tuple[Span, NDArray[np.int64]]]:
+    """Find gaps of one frame, or of at most `LONGEST`, with the free detections near a line.
 
     Near is within `MARGIN` times the largest deviation of the track from such lines elsewhere, and
-    within the least distance, metres.
+    within the given distance, metres. Of more than `MAX_GAPS` those with the nearest are returned.
     """
     reach: dict[tuple[int, int], float] = {}
-    for span in find_gaps(dense.seen):
-        first, last = np.searchsorted(frame_of[free], (span.first, span.last + 1))
-        seconds = dense.times[span.last + 1] - dense.times[span.first - 1]
-        if first == last or (seconds > LONGEST and span.length > 1):
+    spans, frame = find_gaps(dense.seen), frame_of[free]
+    firsts = np.searchsorted(frame, [span.first for span in spans])
+    ends = np.searchsorted(frame, [span.last + 1 for span in spans])
+    found: list[tuple[Span, NDArray[np.int64]]] = []
+    nearest: list[float] = []
+    for span, first, end in zip(spans, firsts.tolist(), ends.tolist(), strict=True):
+        # Rounded to nanoseconds, because times such as k / 120 differ in their last bits.
+        seconds = round(float(dense.times[span.last + 1] - dense.times[span.first - 1]), 9)
+        if first == end or (seconds > LONGEST and span.length > 1):
             continue
         y, key = dense.positions[:, span.track], (span.track, span.length)
         if key not in reach:
-            reach[key] = max(MARGIN * _largest_deviation(y, span.length), least)
-        inside = free[first:last]
-        share = (frame_of[inside] - span.first + 1)[:, None] / (span.length + 1)
+            reach[key] = max(MARGIN * _largest_deviation(y, span.length), min_reach)
+        inside = free[first:end]
+        share = (frame[first:end] - span.first + 1)[:, None] / (span.length + 1)
         line = (1 - share) * y[span.first - 1] + share * y[span.last + 1]
-        off2 = ((points[inside] - line) ** 2).sum(axis=1)
-        if (near := off2 <= reach[key] ** 2).any():
-            yield span, inside[near]
+        off = np.linalg.norm(points[inside] - line, axis=1)
+        if (near := off <= reach[key]).any():
+            found.append((span, inside[near]))
+            nearest.append(off.min())
+    order = np.sort(np.argsort(nearest, kind="stable")[:MAX_GAPS])
+    return [found[n] for n in order]
 
 
 def _reach(model: TrackingModel, n_axes: int) -> float:

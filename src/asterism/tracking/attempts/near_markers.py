@@ -45,7 +45,7 @@ def with_clutter_near_markers(model: TrackingModel, tracks: Tracks) -> TrackingM
     True
     """
     d, n, n_near = tracks.detections, 0, 0
-    for t in range(0, d.n_frames, -(-d.n_frames // MAX_FRAMES)):
+    for t in range(0, d.n_frames, max(-(-d.n_frames // MAX_FRAMES), 1)):
         inside = slice(d.offsets[t], d.offsets[t + 1])
         y, is_own = d.points[inside], tracks.labels[inside] >= 0
         off = y[~is_own, None] - y[None, is_own]

@@ -22,9 +22,16 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from asterism.model import Tracks
     from asterism.tracking.attempts.uncorrected import Uncorrected
 
-__all__ = ["assigned_again", "exchanged_by_spreads", "refined_by_own_distances"]
+__all__ = [
+    "assigned_again",
+    "exchanged_by_spreads",
+    "has_own_distances",
+    "refined_by_own_distances",
+    "searched_again",
+]
 
 MAX_ROUNDS = 4
 """Largest number of times that labels are changed by distances learnt from the tracks, each time
@@ -49,9 +56,9 @@ def refined_by_own_distances(found: Uncorrected) -> Uncorrected:
         Tracks without names.
     """
     tracks = found.tracks
-    is_present = tracks.lengths >= PRESENT * tracks.detections.n_frames
     if not has_own_distances(found):
         return found
+    is_present = _is_present(tracks)
     names = tuple(f"M{k}" if own else None for k, own in enumerate(is_present))
     named, best = dataclasses.replace(tracks, names=names), found
     for n in range(1, MAX_ROUNDS + 1):
@@ -74,15 +81,19 @@ def has_own_distances(found: Uncorrected) -> bool:
         Tracks without names.
     """
     tracks = found.tracks
-    n_present = int((tracks.lengths >= PRESENT * tracks.detections.n_frames).sum())
-    return n_present in MARKERS and tracks.detections.n_frames * tracks.n_tracks <= MAX_CELLS
+    is_small = tracks.detections.n_frames * tracks.n_tracks <= MAX_CELLS
+    return is_small and int(_is_present(tracks).sum()) in MARKERS
+
+
+def _is_present(tracks: Tracks) -> NDArray[np.bool_]:
+    return tracks.lengths >= PRESENT * tracks.detections.n_frames
 
 
 def assigned_again(found: Uncorrected) -> Uncorrected:
     """Assign all detections once more by the distances that tracks keep, and what follows from it.
 
-    Then tracks take lone detections and those of lost markers, and tracks that have each other's
-    marker are exchanged back (`exchanged_by_spreads`). Where the method has bonds, all of that is
+    Then tracks take detections in their gaps and those of lost markers, and tracks that have each
+    other's marker are exchanged back (`exchanged_by_spreads`). Where the method has bonds, all of that is
     repeated with the tracks stitched again, while it makes more identities certain. Where bonds do
     not make the identities of a capture more certain, its distances vary too much.
 
