@@ -93,9 +93,9 @@ def assigned_again(found: Uncorrected) -> Uncorrected:
     """Assign all detections once more by the distances that tracks keep, and what follows from it.
 
     Then tracks take detections in their gaps and those of lost markers, and tracks that have each
-    other's marker are exchanged back (`exchanged_by_spreads`). Where the method has bonds, all of that is
-    repeated with the tracks stitched again, while it makes more identities certain. Where bonds do
-    not make the identities of a capture more certain, its distances vary too much.
+    other's marker are exchanged back (`exchanged_by_spreads`). Where the method has bonds, all of
+    that is repeated with the tracks stitched again, while it makes more identities certain. Where
+    bonds do not make the identities of a capture more certain, its distances vary too much.
 
     Parameters
     ----------
