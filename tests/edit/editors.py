@@ -28,9 +28,9 @@ _captures, _results = [], []
 
 def write_capture(folder):
     """Write a capture with uncertain decisions."""
-    scene = am.simulate.person(frames=250, seed=8)
+    scene = am.simulate.person(frames=250, seed=1)
     truth = am.simulate.corrupt(
-        scene, missing=0.15, missing_run=12, clutter=0.02, noise=0.001, seed=8
+        scene, missing=0.2, missing_run=12, clutter=0.02, noise=0.003, seed=1
     )
     am.write(truth.detections, Path(folder) / CAPTURE)
 
