@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import asterism as am
-from asterism.tracking.attempts.in_gaps import with_detections_in_gaps
+from asterism.tracking.attempts.in_gaps import _log_odds_of_detection, with_detections_in_gaps
 
 CUBE = am.simulate.corrupt(am.simulate.cube(frames=60, seed=1), noise=3e-4, seed=1)
 TRUTH = am.Tracks.from_dense(CUBE.detections.times, CUBE.positions())
@@ -130,7 +130,7 @@ def test_the_probability_is_the_confidence_of_the_detection():
 
 def test_only_certain_detections_are_taken():
     taken = []
-    for off in np.linspace(0, 0.3, 31):
+    for off in np.linspace(0, 0.06, 61):
         before = missed([0, off, 0])
         tracks = dataclasses.replace(before.tracks, confidence=np.ones(len(TRUTH.labels)))
         found = with_detections_in_gaps(dataclasses.replace(before, tracks=tracks), MODEL).tracks
@@ -151,3 +151,19 @@ def test_the_default_takes_a_jolt_as_its_recipe_does():
     assert all(each.probability >= 0.95 for each in found.decisions)
     again = am.track(jolt, recipe=found.recipe)
     np.testing.assert_array_equal(again.labels, found.labels)
+
+
+@pytest.mark.parametrize("length", [1, 2, 4])
+def test_prior_odds_are_those_of_detections_after_detections_and_after_misses(length):
+    sensor = dataclasses.replace(MODEL.sensor, p_detection=0.9, p_redetection=0.3)
+    model = dataclasses.replace(MODEL, sensor=sensor)
+
+    def log_probability(seen):
+        p = [0.9 if before else 0.3 for before in seen[:-1]]
+        return sum(np.log(q if now else 1 - q) for q, now in zip(p, seen[1:], strict=True))
+
+    missed = [True] + [False] * length + [True]
+    for n in range(length):
+        seen = [is_seen or at == n + 1 for at, is_seen in enumerate(missed)]
+        odds = _log_odds_of_detection(np.array([n == 0]), np.array([n == length - 1]), model)
+        assert odds == pytest.approx([log_probability(seen) - log_probability(missed)])
