@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from asterism.model import TrackingModel, Tracks
     from asterism.tracking.stitching import Stitching
 
-__all__ = ["with_detections_in_gaps"]
+__all__ = ["MAX_CELLS", "with_detections_in_gaps"]
 
 DEGREES = 3.0
 """Degrees of freedom of Student's t, the distribution of a detection around the fill of a gap.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asterism.metrics import oracle_tracks
-from asterism.tracking.attempts.in_gaps import with_detections_in_gaps
+from asterism.tracking.attempts.in_gaps import MAX_CELLS, with_detections_in_gaps
 from asterism.tracking.attempts.lost import with_lost_markers
 from asterism.tracking.attempts.shared_search import searched_with_shared_accelerations
 from asterism.tracking.confidence.identity import OTHER_JOIN
@@ -41,8 +41,6 @@ PRESENT = 0.3
 MARKERS = range(4, 201)
 """Number of markers of such a set. With fewer, distances are ambiguous; the time of naming grows
 with the square of the number."""
-MAX_CELLS = 30_000_000
-"""Largest product of frames and tracks for such a set; positions of so many take 0.7 GB."""
 
 
 def refined_by_own_distances(found: Uncorrected) -> Uncorrected:
