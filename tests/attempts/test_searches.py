@@ -14,7 +14,7 @@ WALK = am.simulate.person(frames=60, seed=1)
 RECIPE = am.tracking.plan_tracking(WALK.detections).recipe
 
 
-class Told(Uncorrected):
+class Stated(Uncorrected):
     """Tracks with the numbers of right and wrong detections that they state."""
 
     @property
@@ -26,9 +26,9 @@ class Told(Uncorrected):
         return self.tracks.info["wrong"]
 
 
-def told(right, wrong):
+def stated(right, wrong):
     tracks = dataclasses.replace(WALK, info={"right": right, "wrong": wrong})
-    return Told(tracks=tracks, recipe=RECIPE, model=RECIPE.model)
+    return Stated(tracks=tracks, recipe=RECIPE, model=RECIPE.model)
 
 
 @pytest.mark.parametrize(
@@ -47,10 +47,10 @@ def test_a_search_is_kept_if_more_are_right_and_no_more_wrong(found, n_kept, n_m
 
     def searched(before, progress):
         made.append((before, progress))
-        return told(*next(rest))
+        return stated(*next(rest))
 
     monkeypatch.setattr(most_certain, "searched_again", searched)
-    best = most_certain._after_searches(told(100, 100), lambda: None)
+    best = most_certain._after_searches(stated(100, 100), lambda: None)
     assert len(made) == n_made
     assert best.tracks.info.get("searches", 0) == n_kept
     assert best.expected_right == (found[n_kept - 1][0] if n_kept else 100)
