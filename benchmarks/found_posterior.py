@@ -73,8 +73,11 @@ def shared_gains(
 ) -> NDArray[Any]:
     """Return what shared accelerations add to each piece; a track is of its first given label."""
     cut = within_limits(tracks, model)
-    order, offsets = cut.by_track
-    gains = am.model.shared_gains(cut, model, shared, given[order[offsets[:-1]]])
+    both = np.flatnonzero((cut.labels >= 0) & (given >= 0))
+    labelled, firsts = np.unique(cut.labels[both], return_index=True)
+    markers = np.full(cut.n_tracks, -1)
+    markers[labelled] = given[both[firsts]]
+    gains = am.model.shared_gains(cut, model, shared, markers)
     frame_of = tracks.detections.frame_of
     return np.array([gains[(frame_of >= a) & (frame_of < b)].sum() for a, b in pieces(tracks)])
 

@@ -54,8 +54,8 @@ class Chain {
     visit([&](auto& s) { assign_to(s, labels.data()); });
   }
 
-  // Makes the tracks those of markers that accelerate together: each is of the marker whose label its
-  // first detection has.
+  // Makes the tracks those of markers that accelerate together: each is of the marker whose label the
+  // first of its labelled detections has.
   void give(const In<std::int64_t>& labels, const SharedAcceleration& shared) {
     require(static_cast<std::int64_t>(labels.size()) == n_seen_, "labels: one for each detection");
     for (const std::int64_t label : flat(labels))

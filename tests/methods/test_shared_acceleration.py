@@ -162,6 +162,12 @@ def test_weights_are_those_from_which_detections_were_drawn():
     assert (np.abs(found - weights) < 3 * error + 1e-3).all()
 
 
+def markers_of(labels, given):
+    """The marker of each track, which is the first label given to its detections, -1 for none."""
+    own = [given[labels == k] for k in range(labels.max() + 1)]
+    return np.array([next(iter(each[each >= 0]), -1) for each in own], dtype=int)
+
+
 class Enumerated:
     """All partitions of the last frames, given the tracks before, with their posteriors."""
 
@@ -203,8 +209,7 @@ class Enumerated:
         tracks = am.Tracks(detections=self.tracks.detections, labels=dense)
         own = am.log_posterior(tracks, self.model)
         if np.isfinite(own):
-            firsts = np.array([np.flatnonzero(dense == k)[0] for k in range(tracks.n_tracks)], int)
-            markers = self.tracks.labels[firsts]
+            markers = markers_of(dense, self.tracks.labels)
             gain = am.model.shared_gains(tracks, self.model, self.shared, markers).sum()
             self.found[frozenset(as_partition(dense))] = own + gain
 
@@ -272,18 +277,21 @@ def test_the_gain_of_each_move_is_the_difference_of_the_posteriors(seed, motion)
     model, shared = small_model(motion=motion, max_speed=8.0), made_by_hand(shapes)
     d, given = tracks.detections, tracks.labels.copy()
     given[rng.random(len(given)) < 0.1] = -1
+    start = np.where(d.frame_of < 3, tracks.labels, -1)
     chain = make_chain(d, model, informed=True, seed=seed)
-    chain.assign(np.where(d.frame_of < 3, tracks.labels, -1))
+    chain.assign(start)
     chain.give(given, shared.compiled)
     chain.freeze(1)
     chain.run(500)
+    # A track of which a detection is settled keeps the marker that it had then.
+    at_start = np.append(markers_of(start, given), -1)
+    settled = np.where(d.frame_of <= 1, at_start[start], given)
 
     def posterior(labels):
         number = {v: k for k, v in enumerate(np.unique(labels[labels >= 0]).tolist())}
         dense = np.array([number.get(v, -1) for v in labels.tolist()])
         found = am.Tracks(detections=d, labels=dense)
-        firsts = np.array([np.flatnonzero(dense == k)[0] for k in range(found.n_tracks)], int)
-        gains = am.model.shared_gains(found, model, shared, given[firsts])
+        gains = am.model.shared_gains(found, model, shared, markers_of(dense, settled))
         return am.log_posterior(found, model) + gains.sum()
 
     moves = chain.trace(300)
@@ -313,7 +321,7 @@ def test_mcmcda_keeps_fast_segments_apart_by_their_acceleration():
 
 @pytest.mark.parametrize(("n_frames", "seed"), [(60, 0), (60, 1), (140, 0), (140, 1)])
 def test_a_search_of_a_whole_capture_makes_it_more_probable(n_frames, seed):
-    """In one block, and in two: the posterior includes the neighbours before and after a block."""
+    """In several blocks: the posterior includes the neighbours before and after a block."""
     rng = np.random.default_rng(seed)
     places, _ = segments(rng, (6, 6), n_frames, jump=0.08, own=1e-3, turn=0.2)
     places[:, 6:] += places[:, :1] - places[:, 6:7] + 0.15
@@ -325,8 +333,7 @@ def test_a_search_of_a_whole_capture_makes_it_more_probable(n_frames, seed):
 
     def posterior(labels):
         found = am.Tracks(detections=truth.detections, labels=labels)
-        order, offsets = found.by_track
-        gains = am.model.shared_gains(found, model, shared, truth.labels[order[offsets[:-1]]])
+        gains = am.model.shared_gains(found, model, shared, markers_of(found.labels, truth.labels))
         return am.log_posterior(found, model) + gains.sum()
 
     found = []
@@ -337,6 +344,24 @@ def test_a_search_of_a_whole_capture_makes_it_more_probable(n_frames, seed):
     assert found[0] == pytest.approx(posterior(truth.labels))
     assert found[1] > found[0]
     assert found[2] > found[1]
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_search_takes_unlabelled_detections_before_a_track(seed):
+    """The track stays of its marker, whose neighbours it follows."""
+    rng = np.random.default_rng(seed)
+    places, _ = segments(rng, (7, 7), 60, jump=0.04, own=1e-3, turn=0.1)
+    truth = tracks_of(rng, places, missing=0.05)
+    model = small_model(
+        noise_sigma=1e-3, motion=am.DWNA(acceleration_sigma=15.0, velocity_sigma=1.0), max_speed=8.0
+    )
+    shared = am.tracking.learn_shared_acceleration(truth, model)
+    is_lost = (truth.labels == 5) & (truth.detections.frame_of < 6)
+    given = np.where(is_lost, -1, truth.labels)
+    method = am.MCMCDA(window=None, moves=20, end_odds=1, confidence=0)
+    state = method.init(model, seed=seed, start=given, shared=shared)
+    labels = method.run(state, truth.detections)[1]
+    assert (markers_of(labels, given)[labels[is_lost]] == 5).all()
 
 
 @pytest.mark.parametrize("window", [10, None])

@@ -15,7 +15,7 @@ struct PartitionTrack {
   std::vector<std::int32_t> nodes;
   std::int32_t n_frozen = 0;
   std::int32_t n_gone = 0;  // detections before the first that have left the window
-  std::int32_t marker = -1;  // label given to the first detection, once that is settled
+  std::int32_t marker = -1;  // of which it is, once its first detection is settled
   std::int64_t id = -1;     // public label, once part of the track is settled
   std::int64_t stamp = 0;   // changes with the track; see Partition::clock
 

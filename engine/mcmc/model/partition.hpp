@@ -48,13 +48,18 @@ class Partition {
   void fix(std::vector<FixedPlace> places) { fixed_ = std::move(places); }
   const std::vector<FixedPlace>& fixed() const { return fixed_; }
   std::int64_t given_label(std::int32_t i) const { return given_->of(window_[i].number); }
-  // The marker of a track, which is the label given to its first detection; -1 for none.
+  // The marker of a track, which is the first label given to its detections; -1 for none. It stays
+  // that of a track whose first detection is settled.
   std::int32_t marker(std::int32_t k) const {
     const Track& t = track(k);
-    return t.n_gone + t.n_frozen > 0 ? t.marker : marker_begun_by(first(k));
+    return t.n_gone + t.n_frozen > 0 ? t.marker : marker_of(t.nodes);
   }
-  std::int32_t marker_begun_by(std::int32_t i) const {
-    return is_shared() ? static_cast<std::int32_t>(given_label(i)) : -1;
+  std::int32_t marker_of(std::span<const std::int32_t> nodes) const {
+    if (is_shared())
+      for (const std::int32_t i : nodes)
+        if (const std::int64_t label = given_label(i); label >= 0)
+          return static_cast<std::int32_t>(label);
+    return -1;
   }
 
   const DetectionWindow& window() const { return window_; }
@@ -181,7 +186,7 @@ class Partition {
         const std::int32_t k = track_of_[i];
         if (k == kFree) track_of_[i] = kClutter;
         if (k < 0) continue;
-        if (tracks_[k].n_gone + tracks_[k].n_frozen == 0) tracks_[k].marker = marker_begun_by(i);
+        if (tracks_[k].n_gone + tracks_[k].n_frozen == 0) tracks_[k].marker = marker_of(tracks_[k].nodes);
         ++tracks_[k].n_frozen;
         young_.remove(k);
       }
@@ -241,7 +246,7 @@ class Partition {
     free_.remove(i);
     adopt(k, i, state, 0);
     tracks_[k].n_gone = has_others_before;
-    tracks_[k].marker = marker_begun_by(i);
+    tracks_[k].marker = marker_of(tracks_[k].nodes);
     return k;
   }
 

@@ -1,7 +1,7 @@
 // The part of the log posterior by which markers of a segment accelerate together
 // (rigid/shared_acceleration.hpp), in a part of a partition.
 //
-// Each track is of the marker whose label its first detection was given. The term of a detection
+// Each track is of the marker whose label its first labelled detection was given. The term of a detection
 // depends on the detections of neighbours in its frame, in that of the detection before it, and in
 // the frame before that. A change of tracks changes the terms of
 //
@@ -92,8 +92,11 @@ class SharedTerm {
     list_changes(edits);
     list_dependent(edits);
     for (const Node& one : dependent_) known_at(one) = kUnknown;
-    for (const Edit<Filter>& edit : edits)
+    for (const Edit<Filter>& edit : edits) {
+      for (std::int32_t n = first_changed(edit); n < edit.keep; ++n)
+        known_inside_[part_->track(edit.track).nodes[n]] = kUnknown;
       for (const std::int32_t i : edit.tail.nodes) known_inside_[i] = kUnknown;
+    }
     move_places();
   }
 
@@ -132,8 +135,19 @@ class SharedTerm {
   }
   // The marker of an edited track after the edit.
   std::int32_t new_marker(const Edit<Filter>& edit) const {
-    if (edit.keep > 0) return part_->marker(edit.track);
-    return edit.tail.nodes.empty() ? -1 : part_->marker_begun_by(edit.tail.nodes.front());
+    if (edit.keep > 0) {
+      const PartitionTrack& track = part_->track(edit.track);
+      if (track.n_gone + track.n_frozen > 0) return track.marker;
+      const std::int32_t kept =
+          part_->marker_of(std::span(track.nodes).first(static_cast<std::size_t>(edit.keep)));
+      if (kept >= 0) return kept;
+    }
+    return part_->marker_of(edit.tail.nodes);
+  }
+  // The first detection of an edited track whose term changes by itself: the first after those kept,
+  // or the first of all if the marker changes.
+  std::int32_t first_changed(const Edit<Filter>& edit) const {
+    return edit.keep > 0 && part_->marker(edit.track) != new_marker(edit) ? 0 : edit.keep;
   }
 
   void list_changes(std::span<const Edit<Filter>> edits) {
@@ -144,12 +158,17 @@ class SharedTerm {
       if (edit.track >= 0)
         if (const std::int32_t marker = part_->marker(edit.track); marker >= 0) {
           const auto& nodes = part_->track(edit.track).nodes;
-          for (std::size_t n = edit.keep; n < nodes.size(); ++n)
+          for (std::size_t n = first_changed(edit); n < nodes.size(); ++n)
             all_.push_back({marker, window[nodes[n]].frame, nodes[n], false});
         }
-      if (const std::int32_t marker = new_marker(edit); marker >= 0)
+      if (const std::int32_t marker = new_marker(edit); marker >= 0) {
+        for (std::int32_t n = first_changed(edit); n < edit.keep; ++n) {
+          const std::int32_t i = part_->track(edit.track).nodes[n];
+          all_.push_back({marker, window[i].frame, i, true});
+        }
         for (const std::int32_t i : edit.tail.nodes)
           all_.push_back({marker, window[i].frame, i, true});
+      }
     }
     std::ranges::sort(all_, {}, &Changed::key);
     for (std::size_t n = 0; n < all_.size(); ++n)
@@ -181,7 +200,7 @@ class SharedTerm {
           if (part_->marker(k) != marker) continue;
           std::int32_t n = part_->track(k).size();
           for (const Edit<Filter>& edit : edits)
-            if (edit.track == k) n = edit.keep;
+            if (edit.track == k) n = first_changed(edit);
           list_dependent(*part_, k, n, one.frame, false);
         }
       }
@@ -222,7 +241,8 @@ class SharedTerm {
     const auto& nodes = part_->track(edit.track).nodes;
     double sum = 0;
     if (part_->marker(edit.track) < 0) return sum;
-    for (std::int32_t n = std::max(edit.keep, 1); n < static_cast<std::int32_t>(nodes.size()); ++n)
+    for (std::int32_t n = std::max(first_changed(edit), 1);
+         n < static_cast<std::int32_t>(nodes.size()); ++n)
       sum += known({edit.track, n, false});
     return sum;
   }
@@ -232,6 +252,11 @@ class SharedTerm {
     const Tail<Filter>& tail = edit.tail;
     const std::int32_t n_kept = edit.track < 0 ? 0 : part_->track(edit.track).n_gone + edit.keep;
     double sum = 0;
+    for (std::int32_t n = std::max(first_changed(edit), 1); n < edit.keep; ++n) {
+      const auto& nodes = part_->track(edit.track).nodes;
+      const std::int32_t i = nodes[n - 1];
+      sum += term(*part_, marker, part_->state(i), i, nodes[n], part_->track(edit.track).n_gone + n);
+    }
     for (std::size_t n = edit.keep == 0; n < tail.nodes.size(); ++n) {
       const std::int32_t i = before(*part_, edit, n);
       sum += term(*part_, marker, n == 0 ? part_->state(i) : tail.states[n - 1], i, tail.nodes[n],

@@ -238,10 +238,10 @@ class MCMCDA(EngineMethod):
             from no others.
         shared : SharedAcceleration, optional
             How the markers of the labels accelerate together. A track is of the marker whose label
-            its first detection has, and the chain samples the posterior with `shared_gains`. Tracks
-            of another group of the same frame are fixed meanwhile. A move whose own scores are more
-            than 30 nats too small is rejected unseen. A whole capture is searched in blocks, given
-            the markers before and after each.
+            the first of its labelled detections has, and the chain samples the posterior with
+            `shared_gains`. Tracks of another group of the same frame are fixed meanwhile. A move
+            whose own scores are more than 30 nats too small is rejected unseen. A whole capture is
+            searched in blocks of 30 frames, given the markers before and after each.
 
         Returns
         -------
