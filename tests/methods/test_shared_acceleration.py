@@ -321,7 +321,7 @@ def test_mcmcda_keeps_fast_segments_apart_by_their_acceleration():
 
 @pytest.mark.parametrize(("n_frames", "seed"), [(60, 0), (60, 1), (140, 0), (140, 1)])
 def test_a_search_of_a_whole_capture_makes_it_more_probable(n_frames, seed):
-    """In several blocks: the posterior includes the neighbours before and after a block."""
+    """In one block, and in two: the posterior includes the neighbours before and after a block."""
     rng = np.random.default_rng(seed)
     places, _ = segments(rng, (6, 6), n_frames, jump=0.08, own=1e-3, turn=0.2)
     places[:, 6:] += places[:, :1] - places[:, 6:7] + 0.15
@@ -350,7 +350,7 @@ def test_a_search_of_a_whole_capture_makes_it_more_probable(n_frames, seed):
 def test_a_search_takes_unlabelled_detections_before_a_track(seed):
     """The track stays of its marker, whose neighbours it follows."""
     rng = np.random.default_rng(seed)
-    places, _ = segments(rng, (7, 7), 60, jump=0.04, own=1e-3, turn=0.1)
+    places, _ = segments(rng, (7, 7), 25, jump=0.005, own=1e-3, turn=0.05)
     truth = tracks_of(rng, places, missing=0.05)
     model = small_model(
         noise_sigma=1e-3, motion=am.DWNA(acceleration_sigma=15.0, velocity_sigma=1.0), max_speed=8.0

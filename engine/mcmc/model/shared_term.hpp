@@ -1,9 +1,9 @@
 // The part of the log posterior by which markers of a segment accelerate together
 // (rigid/shared_acceleration.hpp), in a part of a partition.
 //
-// Each track is of the marker whose label its first labelled detection was given. The term of a detection
-// depends on the detections of neighbours in its frame, in that of the detection before it, and in
-// the frame before that. A change of tracks changes the terms of
+// Each track is of the marker whose label the first of its labelled detections was given. The term of
+// a detection depends on the detections of neighbours in its frame, in that of the detection before
+// it, and in the frame before that. A change of tracks changes the terms of
 //
 //   own detections from the first change on, because it changes their filter
 //   other markers that have one of theirs as a neighbour in one of these frames

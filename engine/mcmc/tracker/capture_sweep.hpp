@@ -13,10 +13,10 @@
 // capture's log posterior by a move is therefore that of its block. Blocks overlap by half, so each
 // link is well inside one of them. The cost of a move does not depend on the length of the capture.
 //
-// With given labels of markers that accelerate together, blocks have kSharedBlock frames, and the
-// detections of markers before and after a block, which are not in it, are fixed places. Terms of
-// detections after the block are not in its score: those of continuing tracks, whose marker may
-// change, and of neighbours in the two frames that follow. They are in that of the next block.
+// With given labels of markers that accelerate together, the detections of markers before and after
+// the block, which are not in it, are fixed places. Terms of detections after the block are not in its
+// score: those of continuing tracks, whose marker may change, and of neighbours in the two frames that
+// follow. They are in that of the next block.
 //
 // Tracks are stored as links between detections, which are numbered in order of arrival.
 #pragma once
@@ -68,12 +68,8 @@ class CaptureSweep {
   void add_ambiguous(std::int64_t from, std::int64_t to) {
     ambiguous_.back().push_back({static_cast<std::int32_t>(from), static_cast<std::int32_t>(to)});
   }
-  // Sets labels by which tracks are of markers that accelerate together. A move then changes the terms
-  // of all later detections of its tracks in the block, so that shorter blocks cost less.
-  void give(std::shared_ptr<const GivenLabels> given) {
-    given_ = std::move(given);
-    n_block_ = std::min(n_block_, std::max<std::int64_t>(kSharedBlock, 4 * std::int64_t{max_gap_}));
-  }
+  // Sets labels by which tracks are of markers that accelerate together.
+  void give(std::shared_ptr<const GivenLabels> given) { given_ = std::move(given); }
   void set_label(std::int64_t detection, std::int64_t label) { labels_[detection] = label; }
 
   // Links the detections according to the labels.
@@ -192,7 +188,7 @@ class CaptureSweep {
 
  private:
   static constexpr std::int32_t kNone = -1;
-  static constexpr std::int64_t kAfter = 50, kSharedBlock = 30;  // frames
+  static constexpr std::int64_t kAfter = 50;  // frames
 
   struct Frame {
     double time = 0;

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["labels_of_markers", "searched_with_shared_accelerations"]
 
-MOVES = 30.0
+MOVES = 10.0
 """Moves for each ambiguous detection. With twice as many, hard captures are tracked no better."""
 
 

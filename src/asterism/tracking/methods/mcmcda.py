@@ -241,7 +241,7 @@ class MCMCDA(EngineMethod):
             the first of its labelled detections has, and the chain samples the posterior with
             `shared_gains`. Tracks of another group of the same frame are fixed meanwhile. A move
             whose own scores are more than 30 nats too small is rejected unseen. A whole capture is
-            searched in blocks of 30 frames, given the markers before and after each.
+            searched in blocks, given the markers before and after each.
 
         Returns
         -------
