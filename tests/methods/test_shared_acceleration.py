@@ -300,6 +300,35 @@ def test_the_gain_of_each_move_is_the_difference_of_the_posteriors(seed, motion)
         assert gain == pytest.approx(posterior(after) - posterior(before), rel=1e-7, abs=1e-6)
 
 
+@pytest.mark.parametrize("motion", [FAST, interacting()], ids=["one motion", "several"])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_gain_is_exact_while_tracks_get_and_lose_their_first_label(seed, motion):
+    """No frame is settled, and half of the detections have no label."""
+    rng = np.random.default_rng(seed)
+    places, shapes = segments(rng, (5, 3), 8, n_axes=2 + seed % 2, jump=0.04, own=0.004)
+    places[:, 5:] += places[-1, :1] - places[-1, 5:6] + 0.05
+    tracks = tracks_of(rng, places, missing=0.2)
+    model, shared = small_model(motion=motion, max_speed=8.0), made_by_hand(shapes)
+    d, given = tracks.detections, tracks.labels.copy()
+    given[rng.random(len(given)) < 0.5] = -1
+    chain = make_chain(d, model, informed=True, seed=seed)
+    chain.assign(np.where(d.frame_of < 3, tracks.labels, -1))
+    chain.give(given, shared.compiled)
+    chain.run(500)
+
+    def posterior(labels):
+        number = {v: k for k, v in enumerate(np.unique(labels[labels >= 0]).tolist())}
+        dense = np.array([number.get(v, -1) for v in labels.tolist()])
+        found = am.Tracks(detections=d, labels=dense)
+        gains = am.model.shared_gains(found, model, shared, markers_of(dense, given))
+        return am.log_posterior(found, model) + gains.sum()
+
+    moves = chain.trace(300)
+    assert len(moves) > 100
+    for _, _, before, after, _, _, gain, *_ in moves:
+        assert gain == pytest.approx(posterior(after) - posterior(before), rel=1e-7, abs=1e-6)
+
+
 def test_mcmcda_keeps_fast_segments_apart_by_their_acceleration():
     rng = np.random.default_rng(7)
     places, _ = segments(rng, (7, 7), 150, jump=0.08, own=1e-3, turn=0.2)
