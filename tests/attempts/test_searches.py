@@ -47,7 +47,7 @@ def stated(right, wrong, more=0):
         ([(110, 90), (120, 80, 1)], 1, 2),
     ],
 )
-def test_a_search_is_kept_if_more_are_right_and_no_more_wrong_by_no_more_tracks(
+def test_a_search_is_kept_if_more_are_right_no_more_wrong_and_no_more_tracks(
     found, n_kept, n_made, monkeypatch
 ):
     rest, made = iter([*found, (0, 500)]), []

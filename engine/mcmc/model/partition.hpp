@@ -48,8 +48,8 @@ class Partition {
   void fix(std::vector<FixedPlace> places) { fixed_ = std::move(places); }
   const std::vector<FixedPlace>& fixed() const { return fixed_; }
   std::int64_t given_label(std::int32_t i) const { return given_->of(window_[i].number); }
-  // The marker of a track, which is the first label given to its detections; -1 for none. It stays
-  // that of a track whose first detection is settled.
+  // The marker of a track, which is the first label given to its detections; -1 for none. It does
+  // not change once the first detection is settled.
   std::int32_t marker(std::int32_t k) const {
     const Track& t = track(k);
     return t.n_gone + t.n_frozen > 0 ? t.marker : marker_of(t.nodes);

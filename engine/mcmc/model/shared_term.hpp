@@ -144,8 +144,8 @@ class SharedTerm {
     }
     return part_->marker_of(edit.tail.nodes);
   }
-  // The first detection of an edited track whose term changes by itself: the first after those kept,
-  // or the first of all if the marker changes.
+  // The place in an edited track from which on its own terms change: after the detections that are
+  // kept, or the beginning if the marker changes.
   std::int32_t first_changed(const Edit<Filter>& edit) const {
     return edit.keep > 0 && part_->marker(edit.track) != new_marker(edit) ? 0 : edit.keep;
   }

@@ -137,8 +137,8 @@ def _after_searches(best: Uncorrected, begin: Callable[[], Callable[[int], Any]]
     """Search with shared accelerations from the best tracks, while identities become more certain.
 
     A search also takes detections into tracks, each of which adds to the sum. So fewer of all must
-    be expected to be wrong, too. It must not leave more tracks, because a short one is certain by
-    itself.
+    be expected to be wrong, too. It must not leave more tracks, because the identity of a short
+    one counts as certain.
     """
     n = 0
     while best.is_doubtful and n < MAX_SEARCHES and has_own_distances(best):
