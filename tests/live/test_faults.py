@@ -13,6 +13,7 @@ import pytest
 
 import asterism as am
 from asterism.live import NatNetServer, QtmServer, ServedFrame
+from asterism.live.live_tracker import MAX_EMPTY
 from asterism.tracking import Stitched, method_by_name
 from tests.live import proxy
 from tests.live.judged import judged
@@ -99,21 +100,25 @@ def streamed(system, scene, fault, *, n_frames=N_FRAMES, events=None, n_earlier=
 def offline(frames, scene, *, late=0.0):
     """The same frames tracked offline, where those that did not arrive have no points.
 
-    Frames from the longest gap on may be late by some seconds.
+    As in a stream, only the first `MAX_EMPTY` frames of a gap are tracked. Frames from the longest
+    gap on may be late by some seconds.
     """
     made, model = scene
     by_number = {f.number: f for f in frames}
     gaps = np.diff([f.number for f in frames])
     after = frames[int(gaps.argmax())].number if len(gaps) else 0
     method = Stitched(method=method_by_name("gnn"))
-    state, found = method.init(model), []
+    state, found, last = method.init(model), [], frames[0].number
     for t in range(frames[0].number, frames[-1].number + 1):
         frame = by_number.get(t)
+        if frame is None and t - last > MAX_EMPTY:
+            continue
         points = np.empty((0, 3)) if frame is None else frame.points
         now = float(made.detections.times[t]) + (late if t > after else 0.0)
         state, update = method.step(state, now, points)
         if frame is not None:
             found.append(dataclasses.replace(frame, labels=update.labels))
+            last = t
     return found
 
 
