@@ -5,32 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import asterism as am
-from asterism.tracking.attempts.shared_search import (
-    labels_of_markers,
-    searched_with_shared_accelerations,
-)
-
-
-def test_tracklets_have_the_label_that_most_of_their_detections_had():
-    frame = np.array([0, 0, 1, 1, 2, 2, 3, 3, 4])
-    given = np.array([0, 1, 0, 1, 1, 0, 0, -1, -1])
-    found = np.array([0, 1, 0, 1, 0, 1, 0, 1, 2])
-    # The third detection of each is the other's; a detection without a label joins its tracklet.
-    expected = [0, 1, 0, 1, 0, 1, 0, 1, -1]
-    assert labels_of_markers(found, given, frame).tolist() == expected
-
-
-def test_the_shorter_of_two_tracklets_in_a_frame_is_clutter():
-    frame = np.array([0, 1, 1, 2, 3, 3, 4])
-    given = np.array([3, 3, -1, 3, 3, -1, 3])
-    found = np.array([0, 0, 1, 1, 2, 0, 2])
-    # Track 0 is in frames 0, 1, 3, track 1 in 1 and 2, and track 2 in 3 and 4.
-    assert labels_of_markers(found, given, frame).tolist() == [3, 3, -1, -1, -1, 3, -1]
-
-
-def test_no_tracks_are_found_in_none():
-    none = np.full(3, -1)
-    assert labels_of_markers(none, none, np.arange(3)).tolist() == [-1, -1, -1]
+from asterism.tracking.attempts.shared_search import searched_with_shared_accelerations
 
 
 def test_a_search_takes_detections_back_that_tracks_have_lost():

@@ -393,6 +393,28 @@ def test_a_search_takes_unlabelled_detections_before_a_track(seed):
     assert (markers_of(labels, given)[labels[is_lost]] == 5).all()
 
 
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_search_takes_lost_detections_in_every_block_and_exchanges_no_markers(seed):
+    """Blocks have 100 frames; tracks are lost in the first 40, which are in one block only."""
+    rng = np.random.default_rng(seed)
+    places, _ = segments(rng, (6, 6), 190, jump=0.05, own=1e-3, turn=0.2)
+    places[:, 6:] += places[:, :1] - places[:, 6:7] + 0.15
+    truth = tracks_of(rng, places, missing=0.05)
+    model = small_model(
+        noise_sigma=1e-3, motion=am.DWNA(acceleration_sigma=15.0, velocity_sigma=1.0), max_speed=8.0
+    )
+    shared = am.tracking.learn_shared_acceleration(truth, model)
+    is_lost = (rng.random(len(truth.labels)) < 0.1) & (truth.detections.frame_of < 40)
+    given = np.where(is_lost, -1, truth.labels)
+    method = am.MCMCDA(window=None, moves=20, end_odds=1, confidence=0)
+    state = method.init(model, seed=seed, start=given, shared=shared)
+    labels = method.run(state, truth.detections)[1]
+    markers = markers_of(labels, given)[labels]
+    assert (markers == truth.labels)[is_lost & (truth.labels >= 0)].mean() > 0.9
+    is_last = (truth.detections.frame_of == 189) & (given >= 0)
+    assert (markers == given)[is_last].all()
+
+
 @pytest.mark.parametrize("window", [10, None])
 def test_the_result_is_the_same_for_any_number_of_threads(window):
     rng = np.random.default_rng(8)

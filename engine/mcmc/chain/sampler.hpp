@@ -80,6 +80,7 @@ class Sampler {
     MoveCounts& count = counts_[kind];
     ++count.n_drawn;
     if (!moves_.propose(static_cast<Move>(kind), random_, change_)) return false;
+    if (shared_.excludes(change_.all())) return false;
     ++count.n_possible;
     const Shares& then = shares_[std::min(n_tracks_after(), 2)];
     const int back = static_cast<int>(inverse(change_.move));
@@ -118,7 +119,7 @@ class Sampler {
   };
   template <typename Observe>
   bool step(Listed& move, Observe&& observe) {
-    if (!toggles_.propose(move.toggle, change_)) return false;
+    if (!toggles_.propose(move.toggle, change_) || shared_.excludes(change_.all())) return false;
     if (!move.is_known(partition_) || shared_.is_on()) {
       weigh_completely();
       move.gain = change_.gain;
@@ -134,7 +135,9 @@ class Sampler {
   // impossible or the gain not above `min_gain`.
   bool estimate(const Toggle& toggle, double min_gain, double& gain) {
     change_.min_gain = min_gain - shared_.reach();
-    if (!toggles_.propose(toggle, change_) || !toggles_.estimate(change_)) return false;
+    if (!toggles_.propose(toggle, change_) || shared_.excludes(change_.all()) ||
+        !toggles_.estimate(change_))
+      return false;
     gain = change_.gain;
     if (!shared_.is_on()) return true;
     if (!toggles_.weigh(change_)) return false;

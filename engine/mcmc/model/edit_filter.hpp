@@ -85,20 +85,18 @@ void append_same(const Partition<Filter>& p, Edit<Filter>& edit, std::int32_t j)
   edit.tail.scores.push_back(p.score(j));
 }
 
-// The largest gain of the score by the n-th detection of a tail. That of the first one is known; the
-// density of the others is bounded.
+// The largest gain of the score by the n-th detection of a tail, without its continuation. That of
+// the first one is known; the density of the others is bounded.
 template <typename Filter>
 double max_gain(const Partition<Filter>& p, const Edit<Filter>& edit, std::size_t n) {
   const DetectionWindow& window = p.window();
   const std::int32_t j = edit.tail.nodes[n];
-  const double later = p.is_continuation(j) ? p.continuations().max_gain(window, j) : 0;
-  if (n == 0)
-    return later + (edit.keep == 0 ? p.begin_score() : link_gain(p, before(p, edit, 0), j));
+  if (n == 0) return edit.keep == 0 ? p.begin_score() : link_gain(p, before(p, edit, 0), j);
   const std::int64_t frame = window[j].frame;
   const auto gap = static_cast<int>(frame - window[before(p, edit, n)].frame);
   const DetectionWindow::Steps& steps = *window.frame(frame).steps;
   const bool is_second = edit.keep == 0 && n == 1 && gap == 1;
-  return p.gap_score(gap) + (is_second ? steps.log_peak : steps.log_later_peak) + later;
+  return p.gap_score(gap) + (is_second ? steps.log_peak : steps.log_later_peak);
 }
 
 // An upper bound of the score of an edit, of which some detections may be planned. Detections after
@@ -112,7 +110,11 @@ double max_score_of(const Partition<Filter>& p, const Edit<Filter>& edit,
   if (n == tail.nodes.size()) return p.score_of(edit);
   const std::size_t n_last = std::min(n_filtered, tail.nodes.size());
   double score = n > 0 ? tail.scores.back() : edit.keep > 0 ? p.score(before(p, edit, 0)) : 0;
-  for (std::size_t k = n; k < n_last; ++k) score += max_gain(p, edit, k);
+  for (std::size_t k = n; k < n_last; ++k) {
+    const std::int32_t j = tail.nodes[k];
+    score += max_gain(p, edit, k);
+    if (p.is_continuation(j)) score += p.continuations().max_gain(p.window(), j);
+  }
   const std::int32_t last = tail.nodes.back();
   if (n_last < tail.nodes.size()) score += p.score(last) - p.score(tail.nodes[n_last - 1]);
   return score + p.end_score(last);

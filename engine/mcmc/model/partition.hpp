@@ -47,6 +47,9 @@ class Partition {
   // Sets detections of markers in the frames of the window that are not in it.
   void fix(std::vector<FixedPlace> places) { fixed_ = std::move(places); }
   const std::vector<FixedPlace>& fixed() const { return fixed_; }
+  // From now on, the last detection of a track that leaves the frames stays with its marker.
+  void keep_last_markers() { keeps_last_markers_ = true; }
+  bool keeps_last_markers() const { return keeps_last_markers_; }
   std::int64_t given_label(std::int32_t i) const { return given_->of(window_[i].number); }
   // The marker of a track, which is the first label given to its detections; -1 for none. It does
   // not change once the first detection is settled.
@@ -199,6 +202,7 @@ class Partition {
   void take_part(const Partition& whole, std::span<const std::int32_t> tracks,
                  std::span<const std::int32_t> free) {
     given_ = whole.given_;
+    keeps_last_markers_ = whole.keeps_last_markers_;
     frozen_ = whole.frozen_;
     n_after_ = whole.n_after_;
     later_.clear();
@@ -366,6 +370,7 @@ class Partition {
   DetectionWindow window_;
   std::shared_ptr<const std::vector<double>> log_end_;
   std::shared_ptr<const GivenLabels> given_;
+  bool keeps_last_markers_ = false;
   std::vector<FixedPlace> fixed_;
   std::int64_t frozen_ = -1;
   std::int64_t n_after_ = 0;  // frames of the capture after the window

@@ -73,6 +73,21 @@ class SharedTerm {
   // Nats by which it may outweigh the own scores.
   double reach() const { return is_on_ ? GivenLabels::kReach : 0; }
 
+  // Whether edits are excluded, because a detection in which a track leaves the frames would be of
+  // another marker. What that costs later is not in the score; and where markers have the same
+  // distances to others, their exchange costs nothing later.
+  bool excludes(std::span<const Edit<Filter>> edits) const {
+    if (!is_on_ || !part_->keeps_last_markers()) return false;
+    const DetectionWindow& window = part_->window();
+    for (const Edit<Filter>& edit : edits) {
+      if (edit.tail.nodes.empty()) continue;
+      const std::int32_t i = edit.tail.nodes.back(), k = part_->track_of(i);
+      const bool leaves =
+          part_->is_continuation(i) || window.now() - window[i].frame < window.max_gap();
+      if (leaves && k >= 0 && part_->marker(k) != new_marker(edit)) return true;
+    }
+    return false;
+  }
   // The change of the term by edits, which must be filtered.
   double gain(std::span<const Edit<Filter>> edits) {
     list_changes(edits);
@@ -176,6 +191,8 @@ class SharedTerm {
         ++n;  // lost and got again
       else
         changed_.push_back(all_[n]);
+    is_moved_.assign(shared_->size(), 0);
+    for (const Changed& one : changed_) is_moved_[one.marker] = 1;
   }
   // Moves the places of markers to those after the listed changes, and back.
   void move_places(bool is_back = false) {
@@ -192,32 +209,71 @@ class SharedTerm {
   // Lists the detections that are not edited and have a changed one as a neighbour.
   void list_dependent(std::span<const Edit<Filter>> edits) {
     dependent_.clear();
-    for (const Changed& one : changed_)
-      for (const std::int32_t marker : (*shared_)[one.marker].after) {
-        for (const std::int32_t k : outside_[marker])
-          list_dependent(*whole_, k, whole_->track(k).size(), one.frame, true);
-        for (const std::int32_t k : part_->tracks().items()) {
-          if (part_->marker(k) != marker) continue;
-          std::int32_t n = part_->track(k).size();
-          for (const Edit<Filter>& edit : edits)
-            if (edit.track == k) n = first_changed(edit);
-          list_dependent(*part_, k, n, one.frame, false);
-        }
+    if (changed_.empty()) return;
+    list_inside(edits);
+    is_changed_.resize(static_cast<std::size_t>(n_frames_));
+    for (auto from = changed_.begin(); from != changed_.end();) {
+      const std::int32_t marker = from->marker;
+      const auto to = std::find_if(from, changed_.end(),
+                                   [&](const Changed& one) { return one.marker != marker; });
+      const auto mark = [&](char value) {
+        for (auto one = from; one != to; ++one)
+          is_changed_[static_cast<std::size_t>(one->frame - first_)] = value;
+      };
+      mark(1);
+      for (const std::int32_t other : (*shared_)[marker].after) {
+        for (const std::int32_t k : outside_[other])
+          list_dependent({k, whole_->track(k).size(), true}, other, marker, from->frame);
+        for (const Node& kept : inside_[other]) list_dependent(kept, other, marker, from->frame);
       }
+      mark(0);
+      from = to;
+    }
     std::ranges::sort(dependent_);
     const auto rest = std::ranges::unique(dependent_);
     dependent_.erase(rest.begin(), rest.end());
   }
-  // Those of the first n detections of a track that have one of this frame as a neighbour.
-  void list_dependent(const Partition<Filter>& p, std::int32_t k, std::int32_t n,
-                      std::int64_t frame, bool is_outside) {
-    const auto& nodes = p.track(k).nodes;
-    for (std::int32_t at = n - 1; at > 0; --at) {
-      const std::int64_t to = p.window()[nodes[at]].frame;
-      if (to < frame) return;
-      if (to <= frame + 2 || p.window()[nodes[at - 1]].frame == frame)
-        dependent_.push_back({k, at, is_outside});
+  // Lists the tracks of the part by marker, each with the number of detections whose terms change by
+  // their neighbours alone.
+  void list_inside(std::span<const Edit<Filter>> edits) {
+    inside_.resize(shared_->size());
+    for (std::vector<Node>& of : inside_) of.clear();
+    for (const std::int32_t k : part_->tracks().items())
+      if (const std::int32_t marker = part_->marker(k); marker >= 0)
+        inside_[marker].push_back({k, part_->track(k).size(), false});
+    for (const Edit<Filter>& edit : edits)
+      if (edit.track >= 0)
+        if (const std::int32_t marker = part_->marker(edit.track); marker >= 0)
+          std::ranges::find(inside_[marker], edit.track, &Node::track)->place = first_changed(edit);
+  }
+  // Those of the first detections of a track, up to `end.place`, that have one of the neighbour's
+  // changed ones as a neighbour. None of these is before frame `first`.
+  void list_dependent(const Node& end, std::int32_t marker, std::int32_t neighbour,
+                      std::int64_t first) {
+    const Partition<Filter>& p = end.is_outside ? *whole_ : *part_;
+    const auto& nodes = p.track(end.track).nodes;
+    const auto is_changed = [&](std::int64_t frame) {
+      return frame >= first && is_changed_[static_cast<std::size_t>(frame - first_)] != 0;
+    };
+    for (std::int32_t at = end.place - 1; at > 0; --at) {
+      const std::int64_t from = p.window()[nodes[at - 1]].frame, to = p.window()[nodes[at]].frame;
+      if (to < first) return;
+      const bool has_three = to == from + 1;  // the frames of an acceleration
+      if (is_changed(to) || is_changed(from) || (has_three && is_changed(from - 1)))
+        if (may_see(marker, neighbour, from, to)) dependent_.push_back({end.track, at, end.is_outside});
     }
+  }
+  // Whether a neighbour can be among the steadiest of a marker that are detected in both frames.
+  bool may_see(std::int32_t marker, std::int32_t neighbour, std::int64_t from, std::int64_t to) {
+    std::size_t n_pairs = 0, n_shape = 0;
+    for (const auto& other : (*shared_)[marker].before) {
+      if (other.marker == neighbour) return true;
+      if (is_moved_[other.marker] || place(other.marker, to) == nullptr) continue;
+      n_pairs += place(other.marker, from) != nullptr;
+      n_shape += !std::isnan(other.shape[0]);
+      if (std::min(n_pairs, n_shape) >= kSteadiest) return false;
+    }
+    return true;
   }
 
   double& known_at(const Node& one) {
@@ -287,7 +343,8 @@ class SharedTerm {
   std::int64_t first_ = 0, n_frames_ = 0;
   std::vector<std::vector<Point>> slots_;           // detections by marker and frame
   std::vector<std::vector<std::int32_t>> outside_;  // tracks of the whole partition by marker
-  std::vector<char> is_inside_;
+  std::vector<std::vector<Node>> inside_;           // kept parts of the tracks of the part by marker
+  std::vector<char> is_inside_, is_moved_, is_changed_;  // tracks, markers and frames
   std::vector<Changed> all_, changed_;
   std::vector<Node> dependent_;
   // Terms in the present state, by detection of the part and of the whole partition.

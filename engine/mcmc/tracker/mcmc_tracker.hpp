@@ -96,6 +96,7 @@ class McmcTracker {
         const double n_all = static_cast<double>(n_sweeps * blocks.size());
         const auto go_on = [&](double share) { return goes_on((n_done + share) / n_all); };
         auto part = sweep_.take(partition_, blocks[b]);
+        if (s == 0) part.partition.keep_last_markers();
         const double moves = (s == 0 ? opt_.moves : opt_.confidence) / overlap;
         Split split = split_up(part.partition, part.ambiguous, {}, stats);
         const auto weights = weights_of(split.groups, [](const Group& g) { return g.n_open; });

@@ -134,20 +134,11 @@ def _after_passes(best: Uncorrected, begin: Callable[[], Callable[[int], Any]]) 
 
 
 def _after_searches(best: Uncorrected, begin: Callable[[], Callable[[int], Any]]) -> Uncorrected:
-    """Search with shared accelerations from the best tracks, while identities become more certain.
-
-    A search also takes detections into tracks, each of which adds to the sum. So fewer of all must
-    be expected to be wrong, too. It must not leave more tracks, because the identity of a short
-    one counts as certain.
-    """
+    """Search with shared accelerations from the best tracks, while identities become more certain."""
     n = 0
     while best.is_doubtful and n < MAX_SEARCHES and has_own_distances(best):
-        again = searched_again(best, begin())
-        if (
-            again.expected_right <= best.expected_right
-            or again.expected_wrong > best.expected_wrong
-            or again.tracks.n_tracks > best.tracks.n_tracks
-        ):
+        again = _more_certain(best, searched_again(best, begin()), 0)
+        if again is best:
             break
         best, n = again, n + 1
     if n == 0:

@@ -1,0 +1,189 @@
+"""Changes of tracks by a search, each of which is kept if it is more probable.
+
+A search changes tracks block by block. What a change costs is complete only when the tracks are
+whole again, so each is compared with the tracks as they were given.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from asterism.metrics import oracle_tracks
+from asterism.model import Tracks, shared_gains, track_scores
+from asterism.model.compiled import SPEED_MARGIN_SIGMAS
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from asterism.model import SharedAcceleration, TrackingModel
+
+__all__ = ["log_posterior", "probable_changes", "within_limits"]
+
+AROUND = 50
+"""Number of frames before and after a change in which its probability is compared. By then the
+filter has forgotten it."""
+
+
+def probable_changes(
+    tracks: Tracks,
+    found: NDArray[np.int64],
+    model: TrackingModel,
+    shared: SharedAcceleration,
+) -> NDArray[np.int64]:
+    """Take over the changes of a search, each if the tracks are more probable with it.
+
+    A detection that a track would only lose is kept: jolts are less probable by the model than they
+    are. A tracklet of the search is of the marker whose label is the first that its detections were
+    given. One without a given label is of the marker, absent in its frames, with which the tracks
+    are most probable, or clutter if they are less probable with any.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks from which the search started, one for each marker.
+    found : ndarray of int, shape (N,)
+        Tracklet of each detection, -1 for clutter.
+    model : TrackingModel
+        Model of the markers' own motion.
+    shared : SharedAcceleration
+        Shared accelerations, learnt from the given tracks.
+
+    Returns
+    -------
+    ndarray of int, shape (N,)
+        Track of each detection, -1 for clutter, with the numbers of the given tracks.
+    """
+    given, frame_of = tracks.labels, tracks.detections.frame_of
+    labels = _labels_of_markers(found, given, frame_of)
+    for change in _changes(given, labels, frame_of, model.population.max_gap):
+        other = labels.copy()
+        other[change] = given[change]
+        is_loss = (labels[change] < 0).all()
+        if is_loss or _gain(tracks, labels, other, change, model, shared) >= 0:
+            labels = other
+    for tracklet in _groups(found):
+        if (labels[tracklet] >= 0).any():
+            continue
+        present = labels[np.isin(frame_of, frame_of[tracklet])]
+        best, most = labels, 0.0
+        for marker in np.setdiff1d(np.arange(tracks.n_tracks), present):
+            other = labels.copy()
+            other[tracklet] = marker
+            gain = _gain(tracks, labels, other, tracklet, model, shared)
+            if gain > most:
+                best, most = other, gain
+        labels = best
+    return labels
+
+
+def log_posterior(tracks: Tracks, model: TrackingModel, shared: SharedAcceleration) -> float:
+    """Return the log posterior with shared accelerations, where track k is of marker k.
+
+    Tracks are cut at the gaps and speeds that the model excludes. One that it excludes otherwise
+    counts as clutter.
+
+    Parameters
+    ----------
+    tracks, model, shared
+        As for `asterism.model.shared_gains`.
+    """
+    pieces = within_limits(tracks, model)
+    order, offsets = pieces.by_track
+    scores = track_scores(pieces, model)
+    gains = shared_gains(pieces, model, shared, tracks.labels[order[offsets[:-1]]])
+    return float(scores[np.isfinite(scores)].sum() + gains.sum())
+
+
+def within_limits(tracks: Tracks, model: TrackingModel) -> Tracks:
+    """Return the pieces of tracks between the gaps and the speeds that the model excludes.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks.
+    model : TrackingModel
+        Model with the longest gap and the largest speed.
+    """
+    d, limits = tracks.detections, model.population
+    order, _ = tracks.by_track
+    label, at, time = tracks.labels[order], d.points[order], d.times[d.frame_of[order]]
+    reach = limits.max_speed * np.diff(time) + SPEED_MARGIN_SIGMAS * model.sensor.noise_sigma
+    begins = (label[1:] != label[:-1]) | (np.linalg.norm(np.diff(at, axis=0), axis=1) > reach)
+    labels = np.full(d.n_points, -1)
+    labels[order] = np.cumsum(np.append(False, begins))[: len(order)]
+    return oracle_tracks(Tracks(detections=d, labels=labels), limits.max_gap)
+
+
+def _gain(
+    tracks: Tracks,
+    before: NDArray[np.int64],
+    after: NDArray[np.int64],
+    changed: NDArray[np.int64],
+    model: TrackingModel,
+    shared: SharedAcceleration,
+) -> float:
+    """Return the gain of the log posterior by other labels of some detections, in time order."""
+    d = tracks.detections
+    first = max(int(d.frame_of[changed[0]]) - AROUND, 0)
+    end = min(int(d.frame_of[changed[-1]]) + AROUND + 1, d.n_frames)
+    part, own = d.part(first, end), slice(d.offsets[first], d.offsets[end])
+    a, b = (
+        log_posterior(Tracks(detections=part, labels=labels[own]), model, shared)
+        for labels in (before, after)
+    )
+    return b - a
+
+
+def _labels_of_markers(
+    found: NDArray[np.int64], given: NDArray[np.int64], frame_of: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Return the labels of tracklets, each the first that its detections were given.
+
+    A tracklet without a given label becomes clutter, as does one with a frame in which a longer
+    tracklet has the same label.
+    """
+    labels = np.full(len(found), -1)
+    is_taken = np.zeros((int(given.max(initial=-1)) + 1, int(frame_of.max(initial=-1)) + 1), bool)
+    for tracklet in sorted(_groups(found), key=len, reverse=True):
+        known = given[tracklet][given[tracklet] >= 0]
+        if len(known) and not is_taken[known[0], frame_of[tracklet]].any():
+            labels[tracklet] = known[0]
+            is_taken[known[0], frame_of[tracklet]] = True
+    return labels
+
+
+def _changes(
+    given: NDArray[np.int64], labels: NDArray[np.int64], frame_of: NDArray[np.int64], max_gap: int
+) -> list[NDArray[np.int64]]:
+    """Return the detections of each change, in time order.
+
+    Two detections whose label has changed are of one change if a marker has or had both, at most
+    `max_gap` frames apart, with no detection between them that it keeps.
+    """
+    n, is_changed = len(given), given != labels
+    detections = np.flatnonzero(is_changed)
+    kept = np.flatnonzero(~is_changed & (labels >= 0))
+    all_of = np.concatenate([detections, detections, kept])
+    marker = np.concatenate([given[detections], labels[detections], labels[kept]])
+    order = np.lexsort([all_of, marker])
+    order = order[marker[order] >= 0]
+    all_of, marker = all_of[order], marker[order]
+    is_one = is_changed[all_of[1:]] & is_changed[all_of[:-1]] & (marker[1:] == marker[:-1])
+    is_one &= np.diff(frame_of[all_of]) <= max_gap
+    links = (np.ones(int(is_one.sum())), (all_of[:-1][is_one], all_of[1:][is_one]))
+    _, groups = connected_components(coo_matrix(links, shape=(n, n)), directed=False)
+    changes = _groups(np.where(is_changed, groups, -1))
+    return sorted(changes, key=lambda change: int(frame_of[change[0]]))
+
+
+def _groups(numbers: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """Return the detections of each number, without those of -1."""
+    order = np.argsort(numbers, kind="stable")
+    order = order[numbers[order] >= 0]
+    if not len(order):
+        return []
+    return np.split(order, np.flatnonzero(np.diff(numbers[order])) + 1)
