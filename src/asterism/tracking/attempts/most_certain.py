@@ -134,7 +134,7 @@ def _after_passes(best: Uncorrected, begin: Callable[[], Callable[[int], Any]]) 
 
 
 def _after_searches(best: Uncorrected, begin: Callable[[], Callable[[int], Any]]) -> Uncorrected:
-    """Search with shared accelerations from the best tracks, while identities become more certain."""
+    """Search with shared accelerations, while more identities become certain."""
     n = 0
     while best.is_doubtful and n < MAX_SEARCHES and has_own_distances(best):
         again = _more_certain(best, searched_again(best, begin()), 0)
