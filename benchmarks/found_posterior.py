@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 import asterism as am
-from asterism.model.compiled import SPEED_MARGIN_SIGMAS
+from asterism.tracking.attempts.probable_changes import within_limits
 from captures import captures, options_of_the_run
 from report import conditions, publish, table
 
@@ -40,18 +40,6 @@ def log_posterior(tracks: am.Tracks, model: am.TrackingModel) -> float:
     whole = within_limits(tracks, model)
     scores = am.model.track_scores(whole, model)
     return float(scores[np.isfinite(scores)].sum())
-
-
-def within_limits(tracks: am.Tracks, model: am.TrackingModel) -> am.Tracks:
-    """Return the pieces of tracks between the gaps and the speeds that the model excludes."""
-    d, limits = tracks.detections, model.population
-    order, _ = tracks.by_track
-    label, at, time = tracks.labels[order], d.points[order], d.times[d.frame_of[order]]
-    reach = limits.max_speed * np.diff(time) + SPEED_MARGIN_SIGMAS * model.sensor.noise_sigma
-    begins = (label[1:] != label[:-1]) | (np.linalg.norm(np.diff(at, axis=0), axis=1) > reach)
-    labels = np.full(d.n_points, -1)
-    labels[order] = np.cumsum(np.append(False, begins))[: len(order)]
-    return am.metrics.oracle_tracks(am.Tracks(detections=d, labels=labels), limits.max_gap)
 
 
 def differences(found: am.Tracks, truth: am.Tracks, model: am.TrackingModel) -> NDArray[Any]:

@@ -15,8 +15,8 @@
 //
 // With given labels of markers that accelerate together, the detections of markers before and after
 // the block, which are not in it, are fixed places. Terms of detections after the block are not in its
-// score: those of continuing tracks, whose marker may change, and of neighbours in the two frames that
-// follow. They are in that of the next block.
+// score. A search therefore keeps the marker of each track that leaves the block
+// (Partition::keep_last_markers).
 //
 // Tracks are stored as links between detections, which are numbered in order of arrival.
 #pragma once
