@@ -60,22 +60,24 @@ def probable_changes(
     given, frame_of = tracks.labels, tracks.detections.frame_of
     labels = _labels_of_markers(found, given, frame_of)
     for change in _changes(given, labels, frame_of, model.population.max_gap):
-        other = labels.copy()
-        other[change] = given[change]
+        before = labels.copy()
+        before[change] = given[change]
         is_loss = (labels[change] < 0).all()
-        if is_loss or _gain(tracks, labels, other, change, model, shared) >= 0:
-            labels = other
+        if is_loss or _around(change, tracks, before, model, shared) >= _around(
+            change, tracks, labels, model, shared
+        ):
+            labels = before
     for tracklet in _groups(found):
         if (labels[tracklet] >= 0).any():
             continue
         present = labels[np.isin(frame_of, frame_of[tracklet])]
-        best, most = labels, 0.0
+        best, most = labels, _around(tracklet, tracks, labels, model, shared)
         for marker in np.setdiff1d(np.arange(tracks.n_tracks), present):
             other = labels.copy()
             other[tracklet] = marker
-            gain = _gain(tracks, labels, other, tracklet, model, shared)
-            if gain > most:
-                best, most = other, gain
+            probability = _around(tracklet, tracks, other, model, shared)
+            if probability > most:
+                best, most = other, probability
         labels = best
     return labels
 
@@ -118,24 +120,19 @@ def within_limits(tracks: Tracks, model: TrackingModel) -> Tracks:
     return oracle_tracks(Tracks(detections=d, labels=labels), limits.max_gap)
 
 
-def _gain(
-    tracks: Tracks,
-    before: NDArray[np.int64],
-    after: NDArray[np.int64],
+def _around(
     changed: NDArray[np.int64],
+    tracks: Tracks,
+    labels: NDArray[np.int64],
     model: TrackingModel,
     shared: SharedAcceleration,
 ) -> float:
-    """Return the gain of the log posterior by other labels of some detections, in time order."""
+    """Return the log posterior with other labels in the frames around some, in time order."""
     d = tracks.detections
     first = max(int(d.frame_of[changed[0]]) - AROUND, 0)
     end = min(int(d.frame_of[changed[-1]]) + AROUND + 1, d.n_frames)
-    part, own = d.part(first, end), slice(d.offsets[first], d.offsets[end])
-    a, b = (
-        log_posterior(Tracks(detections=part, labels=labels[own]), model, shared)
-        for labels in (before, after)
-    )
-    return b - a
+    part = Tracks(detections=d.part(first, end), labels=labels[d.offsets[first] : d.offsets[end]])
+    return log_posterior(part, model, shared)
 
 
 def _labels_of_markers(
