@@ -68,12 +68,22 @@ def test_a_tracklet_without_a_label_is_of_the_absent_marker_that_fits():
     np.testing.assert_array_equal(changed(given, found), LABELS)
 
 
-def test_a_tracklet_that_fits_no_absent_marker_is_clutter():
-    clutter = np.flatnonzero(LABELS < 0)
-    pair = next([i, j] for i in clutter for j in clutter if FRAME[j] == FRAME[i] + 1)
-    given, found = np.where(of(7, 50, 60), -1, LABELS), LABELS.copy()
-    found[pair] = LABELS.max() + 1
-    assert (changed(given, found)[pair] == -1).all()
+@pytest.mark.parametrize("n_frames", [2, 10, 40])
+def test_an_object_that_is_no_marker_is_no_absent_marker(n_frames):
+    """It moves steadily far from the neighbours of the marker that is absent meanwhile."""
+    d, here = TRUTH.detections, of(7, 40, 40 + n_frames)
+    at = np.array([[3, 0.02 * t, 1] for t in range(n_frames)])
+    first = d.offsets[40:][:n_frames]
+    extra = am.Detections(
+        times=d.times, points=np.insert(d.points, first, at, axis=0),
+        offsets=d.offsets + np.clip(np.arange(d.n_frames + 1) - 40, 0, n_frames),
+    )  # fmt: skip
+    given = np.insert(np.where(here, -1, LABELS), first, -1)
+    found = np.insert(np.where(here, -1, LABELS), first, LABELS.max() + 1)
+    tracks = am.Tracks(detections=extra, labels=given)
+    alone = am.Tracks(detections=extra, labels=np.where(found == found.max(), 0, -1))
+    assert within_limits(alone, MODEL).n_tracks == 1
+    np.testing.assert_array_equal(probable_changes(tracks, found, MODEL, SHARED), given)
 
 
 def test_the_posterior_is_that_of_the_pieces_between_excluded_gaps():

@@ -34,6 +34,8 @@ def stated(right, wrong):
     ("found", "n_kept", "n_made"),
     [
         ([(110, 90)], 1, 2),
+        ([(110, 109)], 1, 2),
+        ([(110, 110)], 0, 1),  # as many more that are wrong
         ([(100, 90)], 0, 1),  # not more that are right
         ([(110, 90), (120, 80), (130, 70)], 2, 2),  # at most two
         ([(110, 1)], 1, 1),  # in doubt no more

@@ -409,7 +409,7 @@ def test_a_search_takes_lost_detections_in_every_block_and_exchanges_no_markers(
     method = am.MCMCDA(window=None, moves=20, end_odds=1, confidence=0)
     state = method.init(model, seed=seed, start=given, shared=shared)
     labels = method.run(state, truth.detections)[1]
-    markers = markers_of(labels, given)[labels]
+    markers = np.append(markers_of(labels, given), -1)[labels]
     assert (markers == truth.labels)[is_lost & (truth.labels >= 0)].mean() > 0.9
     is_last = (truth.detections.frame_of == 189) & (given >= 0)
     assert (markers == given)[is_last].all()

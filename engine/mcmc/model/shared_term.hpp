@@ -75,16 +75,18 @@ class SharedTerm {
 
   // Whether edits are excluded, because a detection in which a track leaves the frames would be of
   // another marker. What that costs later is not in the score; and where markers have the same
-  // distances to others, their exchange costs nothing later.
+  // distances to others, their exchange costs nothing later. This is for searches: it is not
+  // symmetric.
   bool excludes(std::span<const Edit<Filter>> edits) const {
     if (!is_on_ || !part_->keeps_last_markers()) return false;
     const DetectionWindow& window = part_->window();
     for (const Edit<Filter>& edit : edits) {
       if (edit.tail.nodes.empty()) continue;
       const std::int32_t i = edit.tail.nodes.back(), k = part_->track_of(i);
+      const std::int32_t marker = k < 0 ? -1 : part_->marker(k);
       const bool leaves =
           part_->is_continuation(i) || window.now() - window[i].frame < window.max_gap();
-      if (leaves && k >= 0 && part_->marker(k) != new_marker(edit)) return true;
+      if (leaves && marker >= 0 && marker != new_marker(edit)) return true;
     }
     return false;
   }

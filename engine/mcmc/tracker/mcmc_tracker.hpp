@@ -51,6 +51,7 @@ class McmcTracker {
         seed_(seed),
         start_(options.has_assignment, options.split.ambiguous_within, options.n_threads),
         chains_(chain, options.n_chains, options.n_threads),
+        is_draw_(chain.is_draw),
         sweep_(options.block, sm.max_gap) {}
 
   template <typename Label>
@@ -96,7 +97,7 @@ class McmcTracker {
         const double n_all = static_cast<double>(n_sweeps * blocks.size());
         const auto go_on = [&](double share) { return goes_on((n_done + share) / n_all); };
         auto part = sweep_.take(partition_, blocks[b]);
-        if (s == 0) part.partition.keep_last_markers();
+        if (s == 0 && !is_draw_) part.partition.keep_last_markers();
         const double moves = (s == 0 ? opt_.moves : opt_.confidence) / overlap;
         Split split = split_up(part.partition, part.ambiguous, {}, stats);
         const auto weights = weights_of(split.groups, [](const Group& g) { return g.n_open; });
@@ -366,6 +367,7 @@ class McmcTracker {
   std::uint64_t seed_;
   FrameStart<Filter> start_;
   ParallelChains<Filter> chains_;
+  bool is_draw_;
   AmbiguousLinks ambiguous_;
   // By detection of the window: the probability of its link, and the label and confidence last
   // reported.

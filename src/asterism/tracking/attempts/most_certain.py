@@ -134,11 +134,16 @@ def _after_passes(best: Uncorrected, begin: Callable[[], Callable[[int], Any]]) 
 
 
 def _after_searches(best: Uncorrected, begin: Callable[[], Callable[[int], Any]]) -> Uncorrected:
-    """Search with shared accelerations, while more identities become certain."""
+    """Search with shared accelerations, while more identities become certain.
+
+    A search also takes detections into tracks. More of all must be expected to be right, and by a
+    larger number than more are expected to be wrong.
+    """
     n = 0
     while best.is_doubtful and n < MAX_SEARCHES and has_own_distances(best):
-        again = _more_certain(best, searched_again(best, begin()), 0)
-        if again is best:
+        again = searched_again(best, begin())
+        more_right = again.expected_right - best.expected_right
+        if more_right <= max(again.expected_wrong - best.expected_wrong, 0):
             break
         best, n = again, n + 1
     if n == 0:

@@ -1,7 +1,7 @@
 """Changes of tracks by a search, each of which is kept if it is more probable.
 
 A search changes tracks block by block. What a change costs is complete only when the tracks are
-whole again, so each is compared with the tracks as they were given.
+whole again, so that the tracks with it are then compared with those without it.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 __all__ = ["log_posterior", "probable_changes", "within_limits"]
 
 AROUND = 50
-"""Number of frames before and after a change in which its probability is compared. By then the
-filter has forgotten it."""
+"""Number of frames, besides the longest gap, before and after a change in which its probability is
+compared. By then the filter has forgotten it."""
 
 
 def probable_changes(
@@ -36,10 +36,11 @@ def probable_changes(
 ) -> NDArray[np.int64]:
     """Take over the changes of a search, each if the tracks are more probable with it.
 
-    A detection that a track would only lose is kept: jolts are less probable by the model than they
-    are. A tracklet of the search is of the marker whose label is the first that its detections were
-    given. One without a given label is of the marker, absent in its frames, with which the tracks
-    are most probable, or clutter if they are less probable with any.
+    A tracklet of the search is of the marker whose label is the first that its detections were
+    given. A change by which tracks only lose detections is not taken over: jolts are less probable
+    by the model than they are. A tracklet without a given label is of the marker with bonds, absent
+    in its frames, with which the tracks are most probable. It is clutter if they are more probable
+    with it as clutter, or as a track of no marker.
 
     Parameters
     ----------
@@ -67,12 +68,16 @@ def probable_changes(
             change, tracks, labels, model, shared
         ):
             labels = before
+    is_bonded = np.diff(shared.offsets) > 0
+    is_bonded[shared.others] = True
+    with_bonds = np.flatnonzero(is_bonded)
     for tracklet in _groups(found):
-        if (labels[tracklet] >= 0).any():
+        if (labels[tracklet] >= 0).any() or (given[tracklet] >= 0).any():
             continue
         present = labels[np.isin(frame_of, frame_of[tracklet])]
         best, most = labels, _around(tracklet, tracks, labels, model, shared)
-        for marker in np.setdiff1d(np.arange(tracks.n_tracks), present):
+        most += max(_of_no_marker(tracklet, tracks, model), 0.0)
+        for marker in np.setdiff1d(with_bonds, present):
             other = labels.copy()
             other[tracklet] = marker
             probability = _around(tracklet, tracks, other, model, shared)
@@ -128,11 +133,22 @@ def _around(
     shared: SharedAcceleration,
 ) -> float:
     """Return the log posterior with other labels in the frames around some, in time order."""
-    d = tracks.detections
-    first = max(int(d.frame_of[changed[0]]) - AROUND, 0)
-    end = min(int(d.frame_of[changed[-1]]) + AROUND + 1, d.n_frames)
+    d, margin = tracks.detections, AROUND + model.population.max_gap
+    first = max(int(d.frame_of[changed[0]]) - margin, 0)
+    end = min(int(d.frame_of[changed[-1]]) + margin + 1, d.n_frames)
     part = Tracks(detections=d.part(first, end), labels=labels[d.offsets[first] : d.offsets[end]])
     return log_posterior(part, model, shared)
+
+
+def _of_no_marker(tracklet: NDArray[np.int64], tracks: Tracks, model: TrackingModel) -> float:
+    """Return the log posterior of a tracklet as a track by itself, against clutter."""
+    d = tracks.detections
+    first, end = int(d.frame_of[tracklet[0]]), int(d.frame_of[tracklet[-1]]) + 1
+    labels = np.full(d.offsets[end] - d.offsets[first], -1)
+    labels[tracklet - d.offsets[first]] = 0
+    part = within_limits(Tracks(detections=d.part(first, end), labels=labels), model)
+    scores = track_scores(part, model)
+    return float(scores[np.isfinite(scores)].sum())
 
 
 def _labels_of_markers(
