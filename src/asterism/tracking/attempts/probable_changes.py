@@ -9,8 +9,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from asterism.metrics import oracle_tracks
 from asterism.model import Tracks, shared_gains, track_scores
@@ -177,6 +175,9 @@ def _changes(
     Two detections whose label has changed are of one change if a marker has or had both, at most
     `max_gap` frames apart, with no detection between them that it keeps.
     """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
     n, is_changed = len(given), given != labels
     detections = np.flatnonzero(is_changed)
     kept = np.flatnonzero(~is_changed & (labels >= 0))
