@@ -237,6 +237,9 @@ def two_segments(seed):
     return rng, places, shapes
 
 
+SIZES = {"few neighbours": (5, 3), "more neighbours than are used": (12, 3)}
+"""Markers of two segments. A marker is predicted with at most six of those before it."""
+
 FAST = am.DWNA(acceleration_sigma=20.0, velocity_sigma=0.8)
 
 
@@ -268,11 +271,13 @@ def test_the_chain_samples_several_open_frames_as_enumerated(seed, n, n_open):
 
 @pytest.mark.parametrize("motion", [FAST, interacting()], ids=["one motion", "several"])
 @pytest.mark.parametrize("seed", range(4))
-def test_the_gain_of_each_move_is_the_difference_of_the_posteriors(seed, motion):
+@pytest.mark.parametrize("sizes", SIZES.values(), ids=SIZES)
+def test_the_gain_of_each_move_is_the_difference_of_the_posteriors(sizes, seed, motion):
     """Over several open frames, with gaps, and tracks of the same marker or of none."""
     rng = np.random.default_rng(seed)
-    places, shapes = segments(rng, (5, 3), 8, n_axes=2 + seed % 2, jump=0.04, own=0.004)
-    places[:, 5:] += places[-1, :1] - places[-1, 5:6] + 0.05
+    places, shapes = segments(rng, sizes, 8, n_axes=2 + seed % 2, jump=0.04, own=0.004)
+    second = places[:, sizes[0] :]
+    second += places[-1, :1] - second[-1, :1] + 0.05
     tracks = tracks_of(rng, places, missing=0.2)
     model, shared = small_model(motion=motion, max_speed=8.0), made_by_hand(shapes)
     d, given = tracks.detections, tracks.labels.copy()
@@ -302,11 +307,13 @@ def test_the_gain_of_each_move_is_the_difference_of_the_posteriors(seed, motion)
 
 @pytest.mark.parametrize("motion", [FAST, interacting()], ids=["one motion", "several"])
 @pytest.mark.parametrize("seed", range(4))
-def test_the_gain_is_exact_while_tracks_get_and_lose_their_first_label(seed, motion):
+@pytest.mark.parametrize("sizes", SIZES.values(), ids=SIZES)
+def test_the_gain_is_exact_while_tracks_get_and_lose_their_first_label(sizes, seed, motion):
     """No frame is settled, and half of the detections have no label."""
     rng = np.random.default_rng(seed)
-    places, shapes = segments(rng, (5, 3), 8, n_axes=2 + seed % 2, jump=0.04, own=0.004)
-    places[:, 5:] += places[-1, :1] - places[-1, 5:6] + 0.05
+    places, shapes = segments(rng, sizes, 8, n_axes=2 + seed % 2, jump=0.04, own=0.004)
+    second = places[:, sizes[0] :]
+    second += places[-1, :1] - second[-1, :1] + 0.05
     tracks = tracks_of(rng, places, missing=0.2)
     model, shared = small_model(motion=motion, max_speed=8.0), made_by_hand(shapes)
     d, given = tracks.detections, tracks.labels.copy()

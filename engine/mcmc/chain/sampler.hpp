@@ -119,7 +119,7 @@ class Sampler {
   };
   template <typename Observe>
   bool step(Listed& move, Observe&& observe) {
-    if (!toggles_.propose(move.toggle, change_) || shared_.excludes(change_.all())) return false;
+    if (!propose(move.toggle)) return false;
     if (!move.is_known(partition_) || shared_.is_on()) {
       weigh_completely();
       move.gain = change_.gain;
@@ -135,9 +135,7 @@ class Sampler {
   // impossible or the gain not above `min_gain`.
   bool estimate(const Toggle& toggle, double min_gain, double& gain) {
     change_.min_gain = min_gain - shared_.reach();
-    if (!toggles_.propose(toggle, change_) || shared_.excludes(change_.all()) ||
-        !toggles_.estimate(change_))
-      return false;
+    if (!propose(toggle) || !toggles_.estimate(change_)) return false;
     gain = change_.gain;
     if (!shared_.is_on()) return true;
     if (!toggles_.weigh(change_)) return false;
@@ -192,6 +190,9 @@ class Sampler {
   static constexpr double kOnlyWhatMayBeTaken = std::numeric_limits<double>::infinity();
 
  private:
+  bool propose(const Toggle& toggle) {
+    return toggles_.propose(toggle, change_) && !shared_.excludes(change_.all());
+  }
   template <typename Observe>
   bool take(double log_u, bool is_weighed, Observe&& observe) {
     const bool is_taken = change_.log_ratio > log_u;

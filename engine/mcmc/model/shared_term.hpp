@@ -193,8 +193,6 @@ class SharedTerm {
         ++n;  // lost and got again
       else
         changed_.push_back(all_[n]);
-    is_moved_.assign(shared_->size(), 0);
-    for (const Changed& one : changed_) is_moved_[one.marker] = 1;
   }
   // Moves the places of markers to those after the listed changes, and back.
   void move_places(bool is_back = false) {
@@ -266,11 +264,12 @@ class SharedTerm {
     }
   }
   // Whether a neighbour can be among the steadiest of a marker that are detected in both frames.
+  // Steadier ones may be changed as well: then the detection is listed for the first of them.
   bool may_see(std::int32_t marker, std::int32_t neighbour, std::int64_t from, std::int64_t to) {
     std::size_t n_pairs = 0, n_shape = 0;
     for (const auto& other : (*shared_)[marker].before) {
       if (other.marker == neighbour) return true;
-      if (is_moved_[other.marker] || place(other.marker, to) == nullptr) continue;
+      if (place(other.marker, to) == nullptr) continue;
       n_pairs += place(other.marker, from) != nullptr;
       n_shape += !std::isnan(other.shape[0]);
       if (std::min(n_pairs, n_shape) >= kSteadiest) return false;
@@ -346,7 +345,7 @@ class SharedTerm {
   std::vector<std::vector<Point>> slots_;           // detections by marker and frame
   std::vector<std::vector<std::int32_t>> outside_;  // tracks of the whole partition by marker
   std::vector<std::vector<Node>> inside_;           // kept parts of the tracks of the part by marker
-  std::vector<char> is_inside_, is_moved_, is_changed_;  // tracks, markers and frames
+  std::vector<char> is_inside_, is_changed_;  // tracks and frames
   std::vector<Changed> all_, changed_;
   std::vector<Node> dependent_;
   // Terms in the present state, by detection of the part and of the whole partition.
