@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 import asterism as am
-from asterism.tracking.attempts.probable_changes import within_limits
+from asterism.tracking.attempts.posterior import log_posterior, within_limits
 from captures import captures, options_of_the_run
 from report import conditions, publish, table
 
@@ -33,13 +33,6 @@ NEAR = 1.0
 """Log posterior below that of the truth that still counts as reached, nats."""
 SHARED_MOVES = 20
 """Moves of MCMCDA with shared accelerations, each of which takes twenty times as long."""
-
-
-def log_posterior(tracks: am.Tracks, model: am.TrackingModel) -> float:
-    """Return the log posterior of tracks, cut at the gaps and speeds that the model excludes."""
-    whole = within_limits(tracks, model)
-    scores = am.model.track_scores(whole, model)
-    return float(scores[np.isfinite(scores)].sum())
 
 
 def differences(found: am.Tracks, truth: am.Tracks, model: am.TrackingModel) -> NDArray[Any]:

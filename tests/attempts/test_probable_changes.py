@@ -6,12 +6,8 @@ import numpy as np
 import pytest
 
 import asterism as am
-from asterism.tracking.attempts.probable_changes import (
-    _labels_of_markers,
-    log_posterior,
-    probable_changes,
-    within_limits,
-)
+from asterism.tracking.attempts.posterior import log_posterior, within_limits
+from asterism.tracking.attempts.probable_changes import _labels_of_markers, probable_changes
 
 TRUTH = am.simulate.corrupt(
     am.simulate.person(activity="run", frames=240, seed=1),
@@ -100,6 +96,7 @@ def test_the_posterior_is_that_of_the_pieces_between_excluded_gaps():
             cut.labels[[np.argmax(pieces.labels == k) for k in range(pieces.n_tracks)]],
         ).sum()
     )
+    assert log_posterior(cut, MODEL) == am.log_posterior(pieces, MODEL)
     assert log_posterior(cut, MODEL, SHARED) == pytest.approx(expected)
     assert log_posterior(cut, MODEL, SHARED) < log_posterior(TRUTH, MODEL, SHARED)
 

@@ -10,16 +10,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.metrics import oracle_tracks
-from asterism.model import Tracks, shared_gains, track_scores
-from asterism.model.compiled import SPEED_MARGIN_SIGMAS
+from asterism.model import Tracks
+from asterism.tracking.attempts.posterior import log_posterior
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from asterism.model import SharedAcceleration, TrackingModel
 
-__all__ = ["log_posterior", "probable_changes", "within_limits"]
+__all__ = ["probable_changes"]
 
 AROUND = 50
 """Number of frames, besides the longest gap, before and after a change in which its probability is
@@ -85,44 +84,6 @@ def probable_changes(
     return labels
 
 
-def log_posterior(tracks: Tracks, model: TrackingModel, shared: SharedAcceleration) -> float:
-    """Return the log posterior with shared accelerations, where track k is of marker k.
-
-    Tracks are cut at the gaps and speeds that the model excludes. One that it excludes otherwise
-    counts as clutter.
-
-    Parameters
-    ----------
-    tracks, model, shared
-        As for `asterism.model.shared_gains`.
-    """
-    pieces = within_limits(tracks, model)
-    order, offsets = pieces.by_track
-    scores = track_scores(pieces, model)
-    gains = shared_gains(pieces, model, shared, tracks.labels[order[offsets[:-1]]])
-    return float(scores[np.isfinite(scores)].sum() + gains.sum())
-
-
-def within_limits(tracks: Tracks, model: TrackingModel) -> Tracks:
-    """Return the pieces of tracks between the gaps and the speeds that the model excludes.
-
-    Parameters
-    ----------
-    tracks : Tracks
-        Tracks.
-    model : TrackingModel
-        Model with the longest gap and the largest speed.
-    """
-    d, limits = tracks.detections, model.population
-    order, _ = tracks.by_track
-    label, at, time = tracks.labels[order], d.points[order], d.times[d.frame_of[order]]
-    reach = limits.max_speed * np.diff(time) + SPEED_MARGIN_SIGMAS * model.sensor.noise_sigma
-    begins = (label[1:] != label[:-1]) | (np.linalg.norm(np.diff(at, axis=0), axis=1) > reach)
-    labels = np.full(d.n_points, -1)
-    labels[order] = np.cumsum(np.append(False, begins))[: len(order)]
-    return oracle_tracks(Tracks(detections=d, labels=labels), limits.max_gap)
-
-
 def _around(
     changed: NDArray[np.int64],
     tracks: Tracks,
@@ -144,9 +105,7 @@ def _of_no_marker(tracklet: NDArray[np.int64], tracks: Tracks, model: TrackingMo
     first, end = int(d.frame_of[tracklet[0]]), int(d.frame_of[tracklet[-1]]) + 1
     labels = np.full(d.offsets[end] - d.offsets[first], -1)
     labels[tracklet - d.offsets[first]] = 0
-    part = within_limits(Tracks(detections=d.part(first, end), labels=labels), model)
-    scores = track_scores(part, model)
-    return float(scores[np.isfinite(scores)].sum())
+    return log_posterior(Tracks(detections=d.part(first, end), labels=labels), model)
 
 
 def _labels_of_markers(

@@ -1,0 +1,63 @@
+"""Log posterior of tracks of markers, which may have gaps that the model excludes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.metrics import oracle_tracks
+from asterism.model import Tracks, shared_gains, track_scores
+from asterism.model.compiled import SPEED_MARGIN_SIGMAS
+
+if TYPE_CHECKING:
+    from asterism.model import SharedAcceleration, TrackingModel
+
+__all__ = ["log_posterior", "within_limits"]
+
+
+def log_posterior(
+    tracks: Tracks, model: TrackingModel, shared: SharedAcceleration | None = None
+) -> float:
+    """Return the log posterior of tracks, where track k is of marker k.
+
+    Tracks are cut at the gaps and speeds that the model excludes. One that it excludes otherwise
+    counts as clutter.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks.
+    model : TrackingModel
+        Model of the markers' own motion.
+    shared : SharedAcceleration, optional
+        Shared accelerations; by default there are none.
+    """
+    pieces = within_limits(tracks, model)
+    scores = track_scores(pieces, model)
+    own = float(scores[np.isfinite(scores)].sum())
+    if shared is None:
+        return own
+    order, offsets = pieces.by_track
+    markers = tracks.labels[order[offsets[:-1]]]
+    return own + float(shared_gains(pieces, model, shared, markers).sum())
+
+
+def within_limits(tracks: Tracks, model: TrackingModel) -> Tracks:
+    """Return the pieces of tracks between the gaps and the speeds that the model excludes.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks.
+    model : TrackingModel
+        Model with the longest gap and the largest speed.
+    """
+    d, limits = tracks.detections, model.population
+    order, _ = tracks.by_track
+    label, at, time = tracks.labels[order], d.points[order], d.times[d.frame_of[order]]
+    reach = limits.max_speed * np.diff(time) + SPEED_MARGIN_SIGMAS * model.sensor.noise_sigma
+    begins = (label[1:] != label[:-1]) | (np.linalg.norm(np.diff(at, axis=0), axis=1) > reach)
+    labels = np.full(d.n_points, -1)
+    labels[order] = np.cumsum(np.append(False, begins))[: len(order)]
+    return oracle_tracks(Tracks(detections=d, labels=labels), limits.max_gap)
