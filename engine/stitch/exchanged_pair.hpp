@@ -1,5 +1,5 @@
 // The stretches of frames in which two tracks have each other's marker, by the distances that both
-// keep to other tracks.
+// keep to other tracks and by their motion.
 //
 // Where two tracks are exchanged, their distances to a third marker are exchanged too. If these
 // differ, their difference changes its sign, so that the frames of a pair fall into two groups
@@ -13,6 +13,9 @@
 // bounded, and w is small because the errors of neighbours and of successive frames are alike. The
 // stretches are those of the most probable sequence of states. An edge is moved to where the
 // exchange fits the motion best, and the log-likelihood ratio of the motion there counts as well.
+//
+// With exchanges that fit the motion better than none, the sequence of states gains their ratios as
+// well, and one distance that differs is evidence too.
 #pragma once
 
 #include <algorithm>
@@ -38,17 +41,20 @@ struct ExchangedStretch {
 // The search in one pair of tracks after another.
 class ExchangedPair {
  public:
-  // `noise` is the standard deviation of a coordinate. Without `by_spreads`, pairs whose distances do
-  // not differ are left out.
+  // `noise` is the standard deviation of a coordinate. Without `by_spreads` and `by_motion`, pairs
+  // whose distances do not differ are left out.
   ExchangedPair(const UsualDistances& all, const MotionModel& m, const Timeline& line,
-                double p_detection, double noise, bool by_spreads)
+                double p_detection, double noise, bool by_spreads, bool by_motion)
       : all_(all), m_(m), line_(line), p_detection_(p_detection),
-        floor2_(2 * std::max(noise * noise, kMinNoise * kMinNoise)), by_spreads_(by_spreads) {}
+        floor2_(2 * std::max(noise * noise, kMinNoise * kMinNoise)),
+        by_spreads_(by_spreads || by_motion), by_motion_(by_motion) {}
 
-  // Appends the stretches of a pair.
-  void find(std::int32_t a, std::int32_t b, std::vector<ExchangedStretch>& found) {
+  // Appends the stretches of a pair, with its exchanges by the motion.
+  void find(std::int32_t a, std::int32_t b, std::span<const Exchange> exchanges,
+            std::vector<ExchangedStretch>& found) {
     one_ = a, other_ = b;
     if (!choose_references() || !separate()) return;
+    weigh_changes(exchanges);
     for (int n = 0; n < (by_middles_ ? kRounds : kMoreRounds); ++n) {
       before_ = is_exchanged_;
       if (!weigh()) return;
@@ -77,6 +83,7 @@ class ExchangedPair {
   static constexpr double kMinContrast = 2;     // smallest difference of medians, in deviations
   static constexpr double kMinDivergence = 1;   // smallest one of the distances of both tracks, nats
   static constexpr double kMinTogether = 0.25;  // share of a stretch with both tracks, if by spreads
+  static constexpr std::size_t kMinFrames = 4;  // of a stretch by motion; its edges are independent
   static constexpr int kRounds = 2;             // of learning the distances, at most
   static constexpr int kMoreRounds = 5;         // the same by spreads, from no exchange on
   static constexpr double kMinNoise = 2e-3;     // metres
@@ -233,7 +240,8 @@ class ExchangedPair {
   // are most probable by it.
   bool weigh() {
     learn();
-    if (known_.size() < kMinReferences) return false;
+    const bool is_known = known_.size() >= kMinReferences;
+    if (!is_known && !by_motion_) return false;
     evidence_.assign(frames_.size(), 0);
     for (std::size_t u = 0; u < frames_.size(); ++u) {
       const Point *a = all_.find(one_, frames_[u]), *b = all_.find(other_, frames_[u]);
@@ -250,7 +258,7 @@ class ExchangedPair {
       }
       evidence_[u] = kWeight * sum;
     }
-    decode();
+    decode(is_known);
     const auto n = static_cast<std::size_t>(std::ranges::count(is_exchanged_, 1));
     if (2 * n > frames_.size())
       for (std::size_t u = 0; u < frames_.size(); ++u) {
@@ -300,24 +308,39 @@ class ExchangedPair {
     const double bend = kBend * own.middle;
     return {own.middle, own.spread * own.spread + floor2_ + bend * bend};
   }
-  // The most probable sequence of states (Viterbi), each change of which has a cost.
-  void decode() {
+  // What a change of the state before each frame adds.
+  void weigh_changes(std::span<const Exchange> exchanges) {
+    changes_.assign(frames_.size(), -kChange);
+    for (const Exchange& one : exchanges) {
+      bool is_linked = true;
+      for (const int side : {0, 1}) {
+        const auto n = static_cast<std::int64_t>(all_.frames(one.track[side]).size());
+        is_linked = is_linked && one.tail[side] > 0 && one.tail[side] < n;
+      }
+      if (is_linked)
+        changes_[std::ranges::lower_bound(frames_, one.frame) - frames_.begin()] +=
+            std::max(one.gain, 0.0);
+    }
+  }
+  // The most probable sequence of states (Viterbi). With too few known distances it begins and ends
+  // with no exchange.
+  void decode(bool is_known) {
     const std::size_t U = frames_.size();
     came_from_.assign(U, {0, 1});
-    double kept = 0, exchanged = 0;
+    double kept = 0, exchanged = is_known ? 0 : -kInfinite;
     for (std::size_t u = 0; u < U; ++u) {
       const double stays_kept = kept, stays_exchanged = exchanged;
-      if (stays_exchanged - kChange > stays_kept) {
-        kept = stays_exchanged - kChange;
+      if (stays_exchanged + changes_[u] > stays_kept) {
+        kept = stays_exchanged + changes_[u];
         came_from_[u][0] = 1;
       }
-      if (stays_kept - kChange > stays_exchanged) {
-        exchanged = stays_kept - kChange;
+      if (stays_kept + changes_[u] > stays_exchanged) {
+        exchanged = stays_kept + changes_[u];
         came_from_[u][1] = 0;
       }
       exchanged += evidence_[u];
     }
-    char state = exchanged > kept;
+    char state = is_known && exchanged > kept;
     for (std::size_t u = U; u-- > 0;) {
       is_exchanged_[u] = state;
       state = came_from_[u][static_cast<std::size_t>(state)];
@@ -332,14 +355,16 @@ class ExchangedPair {
     const std::vector<Edge> begins = edges(motion, first), ends = edges(motion, end);
     ExchangedStretch best;
     best.gain = -kInfinite;
+    std::size_t n_frames = 0;
     for (const Edge& from : begins)
       for (const Edge& to : ends) {
         const double gain = sums_[to.at] - sums_[from.at] + from.motion + to.motion;
         if (to.at <= from.at || !(gain > best.gain)) continue;
         const std::int64_t stop = to.at < frames_.size() ? frames_[to.at] : frames_.back() + 1;
         best = {{one_, other_}, frames_[from.at], stop, gain};
+        n_frames = to.at - from.at;
       }
-    if (best.gain > kMinGain) found.push_back(best);
+    if (best.gain > kMinGain && (!by_motion_ || n_frames >= kMinFrames)) found.push_back(best);
   }
   // Number of frames with both tracks.
   double n_together(std::size_t first, std::size_t end) const {
@@ -376,12 +401,12 @@ class ExchangedPair {
   const MotionModel& m_;
   const Timeline& line_;
   double p_detection_, floor2_;
-  bool by_spreads_;
+  bool by_spreads_, by_motion_;
   std::int32_t one_ = 0, other_ = 0;
   std::vector<std::int64_t> frames_;     // with a detection of at least one track
   std::vector<std::size_t> together_;    // indices of those with both
   std::vector<char> is_exchanged_, before_;  // in each of `frames`, and before a round
-  std::vector<double> evidence_, sums_;   // of each of them, and before each
+  std::vector<double> evidence_, sums_, changes_;  // of each of them, and before each
   std::vector<std::int32_t> references_;
   bool by_middles_ = true;  // whether the middles of the distances differ enough
   std::vector<Known> known_;

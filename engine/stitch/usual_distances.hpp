@@ -53,7 +53,6 @@ class UsualDistances {
     usual_.assign(tracks_.size() * tracks_.size(), kUnknown);
     std::vector<double> values;
     // Fragments are compared with nothing, however many there are.
-    const auto is_long = [&](std::int32_t k) { return tracks_[k].frames.size() >= kMinTogether; };
     for (std::int32_t a = 0; a < K; ++a)
       for (std::int32_t b = a + 1; b < K && is_long(a); ++b) {
         if (!is_long(b)) continue;
@@ -69,6 +68,8 @@ class UsualDistances {
         usual_[place(a, b)] = usual_[place(b, a)] = std::sqrt(*middle);
       }
   }
+  // Whether a track is long enough to be compared.
+  bool is_long(std::int32_t k) const { return tracks_[k].frames.size() >= kMinTogether; }
   std::int32_t n_tracks() const { return static_cast<std::int32_t>(tracks_.size()); }
   std::int64_t n_frames() const { return T_; }
   std::span<const Point> points(std::int32_t k) const { return tracks_[k].points; }

@@ -547,6 +547,7 @@ def exchanged_stretches(
     p_detection: float,
     noise: float,
     by_spreads: bool,
+    by_motion: bool,
 ) -> tuple[Ints, Ints, Floats]: ...
 
 # Track of each detection, with those of tracks that had none in the frame.

@@ -6,12 +6,15 @@ import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 import asterism as am
 from asterism.tracking.attempts import own_distances
 from asterism.tracking.attempts.uncorrected import Uncorrected
 from asterism.tracking.methods import TOMHT, Rigidity, options_of
 from asterism.tracking.plan import plan_tracking
+from asterism.tracking.stitching.exchanged import with_markers
+from tests.scenes import exchanged
 
 HIDDEN, FIRST, LAST = (3, 4), 60, 100
 
@@ -38,6 +41,27 @@ def followed_through_a_gap():
         probabilities=np.ones(tracks.n_tracks), cuts=np.empty((0, 2), dtype=np.int64),
     )  # fmt: skip
     return person, Uncorrected(tracks=tracks, recipe=recipe, model=model, stitching=stitching)
+
+
+@pytest.mark.parametrize(("is_doubtful", "lead"), [(True, 20), (True, 1e4), (False, 20)])
+def test_tracks_in_doubt_are_exchanged_back_where_that_is_more_probable(
+    is_doubtful, lead, monkeypatch
+):
+    monkeypatch.setattr(
+        "asterism.tracking.attempts.uncorrected.DOUBTFUL", -1.0 if is_doubtful else 1.0
+    )
+    monkeypatch.setattr(own_distances, "EXCHANGE", lead)
+    person, found = followed_through_a_gap()
+    right = am.stitch(person, found.model)
+    pair = [int(right.tracks.labels[person.labels == k][0]) for k in HIDDEN]
+    wrong = exchanged(right.tracks, pair, range(FIRST, LAST))
+    stitching = with_markers(right, wrong.labels, np.full(len(wrong.labels), 0.95))
+    before = dataclasses.replace(found, tracks=wrong, stitching=stitching)
+    after = own_distances.exchanged_if_more_probable(before)
+    if not is_doubtful or lead > 20:
+        assert after is before
+    else:
+        np.testing.assert_array_equal(after.tracks.labels, right.tracks.labels)
 
 
 def test_tracks_are_cut_at_gaps_that_the_model_excludes_and_keep_their_labels():

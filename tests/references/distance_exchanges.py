@@ -1,7 +1,8 @@
 """Stretches in which two tracks have each other's marker, computed plainly.
 
 Positions are arrays of shape (frames, tracks, D), NaN where a track has no detection. The motion is
-a function of two tracks and a frame, so that this is the evidence of the distances alone.
+a function of two tracks and a frame, so that this is the evidence of the distances alone. By
+motion, `exchanges` has the ratios of the exchanges that are possible, by pair and frame.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import numpy as np
 NEAR, REFERENCES, CANDIDATES, CONTRAST, DIVERGENCE, BOTH = 0.3, 8, 16, 2.0, 1.0, 0.25
 USUAL, SAMPLED, TOGETHER, KNOWN, MIN_USUAL, ROUNDS = 150, 600, 20, 10, 5, 5
 BEND, BOUND, WEIGHT, CHANGE, MIN_GAIN, MIN_MOTION, MOVED = 0.02, 5.0, 1 / 40, 4.0, 6.0, -30.0, 10
+SHORTEST = 4
 
 
 def upper_median(values):
@@ -41,15 +43,15 @@ def sampled(rows):
     return rows[np.arange(n) * len(rows) // n]
 
 
-def decoded(evidence):
+def decoded(evidence, changes, is_known):
     """The most probable states by trying, for each frame, both states before it."""
-    score, paths = [0.0, 0.0], [[], []]
-    for e in evidence:
-        best = [max((0, 1), key=lambda s, to=to: score[s] - CHANGE * (s != to) + 1e-12 * (s == to))
+    score, paths = [0.0, 0.0 if is_known else -np.inf], [[], []]
+    for e, change in zip(evidence, changes, strict=True):
+        best = [max((0, 1), key=lambda s, to=to: score[s] + change * (s != to) + 1e-12 * (s == to))
                 for to in (0, 1)]  # fmt: skip
         paths = [[*paths[best[to]], to] for to in (0, 1)]
-        score = [score[best[to]] - CHANGE * (best[to] != to) + e * to for to in (0, 1)]
-    return np.array(paths[int(score[1] > score[0])])
+        score = [score[best[to]] + change * (best[to] != to) + e * to for to in (0, 1)]
+    return np.array(paths[int(is_known and score[1] > score[0])])
 
 
 def log_ratio(distance, middle, variance, against, its_variance):
@@ -58,10 +60,10 @@ def log_ratio(distance, middle, variance, against, its_variance):
     return np.nan_to_num(np.clip(ratio, -BOUND, BOUND))
 
 
-def stretches(positions, noise, motion, by_spreads=False):
+def stretches(positions, noise, motion, by_spreads=False, exchanges=None):
     """Return (a, b, first frame, end, log odds) of all pairs; `motion(a, b, frame)` is theirs."""
     floor2 = 2 * max(noise, 2e-3) ** 2
-    usual = usual_distances(positions)
+    usual, by_motion = usual_distances(positions), exchanges is not None
     is_seen = np.isfinite(positions[..., 0])
     found = []
     for a, b in zip(*np.nonzero(np.triu(usual < NEAR)), strict=True):
@@ -104,10 +106,14 @@ def stretches(positions, noise, motion, by_spreads=False):
             if not sides.any() or sides.all():
                 continue
             state[together] = sides
-        elif by_spreads:
+        elif by_spreads or by_motion:
             columns = list(range(len(candidates)))
         else:
             continue
+        changes = np.full(len(frames), -CHANGE)
+        if by_motion:
+            of_pair = exchanges.get((a, b), {})
+            changes += [max(of_pair.get(t, 0.0), 0.0) for t in frames]
         evidence = None
         for _ in range(2 if by_middles else ROUNDS):
             some = sampled(np.arange(len(frames)))
@@ -126,7 +132,8 @@ def stretches(positions, noise, motion, by_spreads=False):
                 if divergence > (CONTRAST**2 if by_middles else DIVERGENCE):
                     known.append((-divergence, candidates[r], r, m, v, n, w))
             known = sorted(known)[:REFERENCES]
-            if len(known) < 2:
+            is_known = len(known) >= 2
+            if not is_known and not by_motion:
                 evidence = None
                 break
             has_both = np.isin(np.arange(len(frames)), together)
@@ -135,7 +142,7 @@ def stretches(positions, noise, motion, by_spreads=False):
                 v, w = (np.where(has_both, x, max(v, w)) for x in (v, w))
                 evidence += WEIGHT * log_ratio(of_a[:, r], n, w, m, v)
                 evidence += WEIGHT * log_ratio(of_b[:, r], m, v, n, w)
-            state = decoded(evidence)
+            state = decoded(evidence, changes, is_known)
             if 2 * state.sum() > len(state):
                 state, evidence = 1 - state, -evidence
         if evidence is None:
@@ -150,10 +157,10 @@ def stretches(positions, noise, motion, by_spreads=False):
                     gain = evidence[i:j].sum() + before + after
                     if j > i and gain > best[0] + 1e-9:
                         best = (gain, i, j)
-            if best[0] > MIN_GAIN:
-                _, i, j = best
+            gain, i, j = best
+            if gain > MIN_GAIN and (not by_motion or j - i >= SHORTEST):
                 stop = frames[j] if j < len(frames) else frames[-1] + 1
-                found.append((int(a), int(b), int(frames[i]), int(stop), best[0]))
+                found.append((int(a), int(b), int(frames[i]), int(stop), gain))
     return found
 
 

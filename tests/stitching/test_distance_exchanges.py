@@ -21,6 +21,10 @@ from tests.scenes import exchanged, sized, steady_and_loose
 NOISE = 1e-3
 
 
+def always(before, after, changed):
+    return True
+
+
 def positions_of(tracks):
     d = tracks.detections
     positions = np.full((d.n_frames, tracks.n_tracks, d.n_axes), np.nan)
@@ -40,13 +44,14 @@ def near_pairs(tracks):
     return np.argwhere(np.triu(np.nanmedian(distance, axis=0) < 0.2, 1))
 
 
-def of_engine(tracks, model, noise=NOISE, *, by_spreads=False):
+def of_engine(tracks, model, noise=NOISE, *, by_spreads=False, by_motion=False):
     d, (kind, F, Q) = tracks.detections, steps_of(model.motion, tracks.detections.times)
     order, offsets = tracks.by_track
     found = _engine.exchanged_stretches(
         motion_model(model, d.n_axes), d.times, kind, F, Q, np.ascontiguousarray(d.points[order]),
         d.frame_of[order].astype(np.int64), offsets.astype(np.int64),
-        np.ones(tracks.n_tracks, dtype=bool), p_detection=0.9, noise=noise, by_spreads=by_spreads,
+        np.ones(tracks.n_tracks, dtype=bool), p_detection=0.9, noise=noise,
+        by_spreads=by_spreads, by_motion=by_motion,
     )  # fmt: skip
     return [
         (*pair.tolist(), *stretch.tolist(), gain)
@@ -79,9 +84,26 @@ def motion_of(tracks, model):
     return ratio
 
 
-@pytest.mark.parametrize("by_spreads", [False, True])
+def exchanges_of(tracks, model):
+    """Ratios of the exchanges of tracks that both go on, by pair and frame."""
+    d, (kind, F, Q) = tracks.detections, steps_of(model.motion, tracks.detections.times)
+    order, offsets = tracks.by_track
+    before, after, ratios, frames = _engine.exchanges(
+        motion_model(model, d.n_axes), d.times, kind, F, Q, np.ascontiguousarray(d.points[order]),
+        d.frame_of[order].astype(np.int64), offsets.astype(np.int64), p_detection=0.9, n_threads=1,
+    )  # fmt: skip
+    found = {}
+    for i in np.flatnonzero((before >= 0).all(axis=1) & (after >= 0).all(axis=1)):
+        pair = tuple(tracks.labels[order[before[i]]].tolist())
+        found.setdefault(pair, {})[int(frames[i])] = ratios[i]
+    return found
+
+
+@pytest.mark.parametrize(
+    ("by_spreads", "by_motion"), [(False, False), (True, False), (False, True)]
+)
 @pytest.mark.parametrize("seed", range(sized(4, 1)))
-def test_stretches_are_those_of_the_reference(seed, by_spreads):
+def test_stretches_are_those_of_the_reference(seed, by_spreads, by_motion):
     rng = np.random.default_rng(seed)
     person = am.simulate.person(frames=160, seed=seed)
     truth = am.simulate.corrupt(person, missing=0.15, noise=NOISE, seed=seed)
@@ -91,8 +113,10 @@ def test_stretches_are_those_of_the_reference(seed, by_spreads):
         first, n = rng.integers(0, 140), rng.integers(5, 60)
         tracks = exchanged(tracks, pair, range(first, first + n))
     model = model_of(tracks.detections)
-    found = of_engine(tracks, model, by_spreads=by_spreads)
-    wanted = stretches(positions_of(tracks), NOISE, motion_of(tracks, model), by_spreads)
+    found = of_engine(tracks, model, by_spreads=by_spreads, by_motion=by_motion)
+    exchanges = exchanges_of(tracks, model) if by_motion else None
+    motion = motion_of(tracks, model)
+    wanted = stretches(positions_of(tracks), NOISE, motion, by_spreads, exchanges)
     assert [f[:4] for f in found] == [w[:4] for w in wanted]
     assert [f[4] for f in found] == pytest.approx([w[4] for w in wanted], abs=1e-6)
     assert len(found) >= 2
@@ -131,9 +155,54 @@ def test_an_exchange_is_undone_by_the_spreads_of_distances(seed):
     assert (log_odds[wrong != truth.labels] > 6).all()
 
 
+def two_that_circle(seed):
+    """A rod of five markers, and two that circle around it with the same distances to it."""
+    rng = np.random.default_rng(seed)
+    angle = 3 * np.arange(400) * 0.01 + rng.uniform(0, 6)
+    circle = 0.1 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    middle = np.array([0, 0, 0.2])
+    rod = [np.tile(0.5 * k * middle, (400, 1)) for k in range(5)]
+    positions = np.stack([*rod, middle + circle, middle - circle], axis=1)
+    positions += rng.normal(0, NOISE, positions.shape)
+    return am.Tracks.from_dense(np.arange(400) * 0.01, positions, tuple("ABCDEFG"))
+
+
+@pytest.mark.parametrize("seed", range(sized(4, 1)))
+def test_an_exchange_of_tracks_with_the_same_distances_is_undone_by_the_motion(seed):
+    truth = two_that_circle(seed)
+    d, model = truth.detections, model_of(truth.detections)
+    wrong = exchanged(truth, (5, 6), range(150, 260)).labels.astype(np.int64)
+    labels, _ = exchanged_back(d, wrong, model, by_spreads=True)
+    assert np.array_equal(labels, wrong)  # not by the distances
+    labels, log_odds = exchanged_back(d, wrong, model, accepts=always)
+    assert np.array_equal(labels, truth.labels)
+    assert (log_odds[wrong != truth.labels] > 6).all()
+
+
+def test_an_exchange_is_made_if_it_is_accepted():
+    truth = two_that_circle(1)
+    wrong = exchanged(truth, (5, 6), range(150, 260)).labels.astype(np.int64)
+    asked = []
+
+    def accepts(before, after, changed):
+        asked.append((before, after, changed))
+        return False
+
+    labels, log_odds = exchanged_back(
+        truth.detections, wrong, model_of(truth.detections), accepts=accepts
+    )
+    assert np.array_equal(labels, wrong)
+    assert np.isinf(log_odds).all()
+    ((before, after, changed),) = asked
+    assert np.array_equal(before, wrong)
+    assert np.array_equal(after, truth.labels)
+    assert np.array_equal(changed, np.flatnonzero(wrong != truth.labels))
+
+
+@pytest.mark.parametrize("by_motion", [False, True])
 @pytest.mark.parametrize("seed", range(sized(4, 1)))
 @pytest.mark.parametrize("n_alone", [0, 150, 270])
-def test_stretches_by_spreads_are_those_of_the_reference(n_alone, seed):
+def test_stretches_by_spreads_are_those_of_the_reference(n_alone, seed, by_motion):
     """The swinging marker is exchanged, and absent for a part of that stretch."""
     truth = steady_and_loose(seed, until=450)
     d, frame = truth.detections, truth.detections.frame_of
@@ -143,23 +212,25 @@ def test_stretches_by_spreads_are_those_of_the_reference(n_alone, seed):
     tracks = am.Tracks(detections=d.keep(kept), labels=truth.labels[kept])
     tracks = exchanged(tracks, (5, 6), range(105, 455))
     model = model_of(tracks.detections)
-    found = of_engine(tracks, model, by_spreads=True)
-    wanted = stretches(positions_of(tracks), NOISE, motion_of(tracks, model), by_spreads=True)
+    found = of_engine(tracks, model, by_spreads=True, by_motion=by_motion)
+    exchanges = exchanges_of(tracks, model) if by_motion else None
+    motion = motion_of(tracks, model)
+    wanted = stretches(positions_of(tracks), NOISE, motion, True, exchanges)
     assert [f[:4] for f in found] == [w[:4] for w in wanted]
     assert [f[4] for f in found] == pytest.approx([w[4] for w in wanted], abs=1e-6)
     assert (len(found) > 0) == (n_alone < 270)  # three quarters alone are too many
 
 
-@pytest.mark.parametrize("by_spreads", [False, True])
+@pytest.mark.parametrize("options", [{}, {"by_spreads": True}, {"accepts": always}])
 @pytest.mark.parametrize("seed", range(sized(4, 1)))
 @pytest.mark.parametrize("scene", ["person", "smooth", "fingers", "cube"])
-def test_right_tracks_are_left_alone(scene, seed, by_spreads):
-    options = {"n_markers": 20} if scene == "smooth" else {}
-    made = getattr(am.simulate, scene)(frames=200, seed=seed, **options)
+def test_right_tracks_are_left_alone(scene, seed, options):
+    size = {"n_markers": 20} if scene == "smooth" else {}
+    made = getattr(am.simulate, scene)(frames=200, seed=seed, **size)
     truth = am.simulate.corrupt(made, missing=0.1, noise=NOISE, seed=seed)
     labels = truth.labels.astype(np.int64)
     model = model_of(truth.detections)
-    again, log_odds = exchanged_back(truth.detections, labels, model, by_spreads=by_spreads)
+    again, log_odds = exchanged_back(truth.detections, labels, model, **options)
     assert np.array_equal(again, labels)
     assert np.isinf(log_odds).all()
 
@@ -268,7 +339,7 @@ def test_the_engine_refuses_what_does_not_fit(changes):
         "motion": motion_model(model, 3), "times": d.times, "kind": kind, "F": F, "Q": Q,
         "points": np.zeros((4, 3)), "frames": np.array([0, 1, 0, 1]),
         "offsets": np.array([0, 2, 4]), "is_examined": np.ones(2, dtype=bool),
-        "p_detection": 0.9, "noise": 0.001, "by_spreads": False,
+        "p_detection": 0.9, "noise": 0.001, "by_spreads": False, "by_motion": False,
     }  # fmt: skip
     _engine.exchanged_stretches(**given)
     with pytest.raises(ValueError, match=next(iter(changes))):

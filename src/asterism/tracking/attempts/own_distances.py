@@ -10,10 +10,12 @@ import numpy as np
 from asterism.metrics import oracle_tracks
 from asterism.tracking.attempts.in_gaps import MAX_CELLS, with_detections_in_gaps
 from asterism.tracking.attempts.lost import with_lost_markers
+from asterism.tracking.attempts.posterior import log_posterior_around
 from asterism.tracking.attempts.shared_search import searched_with_shared_accelerations
 from asterism.tracking.confidence.identity import OTHER_JOIN
 from asterism.tracking.confidence.reassign import ghost_log_odds, reassigned
 from asterism.tracking.naming import learn_marker_set, name_tracks
+from asterism.tracking.rigidity import learn_shared_acceleration
 from asterism.tracking.stitching import stitch
 from asterism.tracking.stitching.exchanged import exchanged_back, with_markers
 
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
 __all__ = [
     "assigned_again",
     "exchanged_by_spreads",
+    "exchanged_if_more_probable",
     "has_own_distances",
     "refined_by_own_distances",
     "searched_again",
@@ -41,6 +44,9 @@ PRESENT = 0.3
 MARKERS = range(4, 201)
 """Number of markers of such a set. With fewer, distances are ambiguous; the time of naming grows
 with the square of the number."""
+
+EXCHANGE = 20.0
+"""Log odds by the posterior with shared accelerations from which tracks are exchanged."""
 
 
 def refined_by_own_distances(found: Uncorrected) -> Uncorrected:
@@ -212,6 +218,38 @@ def exchanged_by_spreads(found: Uncorrected) -> Uncorrected:
     if found.stitching is None or not found.is_doubtful:
         return found
     labels, _ = exchanged_back(tracks.detections, tracks.labels, found.model, by_spreads=True)
+    if np.array_equal(labels, tracks.labels):
+        return found
+    return _with_labels(found, labels, int(tracks.info.get("refinements", 0)))
+
+
+def exchanged_if_more_probable(found: Uncorrected) -> Uncorrected:
+    """Exchange tracks back where motion tells that they have each other's marker, if in doubt.
+
+    The motion at the edges of the exchange must favour it together with the distances, and the log
+    posterior with shared accelerations as well. It is for final tracks: the confidence hardly sees
+    such an exchange, so that it could not compare the attempts that follow.
+
+    Parameters
+    ----------
+    found : Uncorrected
+        Tracks without names.
+    """
+    tracks, model = found.tracks, found.model
+    if found.stitching is None or not found.is_doubtful or not has_own_distances(found):
+        return found
+    shared = learn_shared_acceleration(tracks, model)
+
+    def accepts(
+        before: NDArray[np.int64], after: NDArray[np.int64], changed: NDArray[np.int64]
+    ) -> bool:
+        with_it, without = (
+            log_posterior_around(changed, tracks, labels, model, shared)
+            for labels in (after, before)
+        )
+        return with_it > without + EXCHANGE
+
+    labels, _ = exchanged_back(tracks.detections, tracks.labels, model, accepts=accepts)
     if np.array_equal(labels, tracks.labels):
         return found
     return _with_labels(found, labels, int(tracks.info.get("refinements", 0)))

@@ -11,9 +11,15 @@ from asterism.model import Tracks, shared_gains, track_scores
 from asterism.model.compiled import SPEED_MARGIN_SIGMAS
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from asterism.model import SharedAcceleration, TrackingModel
 
-__all__ = ["log_posterior", "within_limits"]
+__all__ = ["log_posterior", "log_posterior_around", "within_limits"]
+
+AROUND = 50
+"""Number of frames, besides the longest gap, before and after a change in which its probability is
+compared. By then the filter has forgotten it."""
 
 
 def log_posterior(
@@ -41,6 +47,33 @@ def log_posterior(
     order, offsets = pieces.by_track
     markers = tracks.labels[order[offsets[:-1]]]
     return own + float(shared_gains(pieces, model, shared, markers).sum())
+
+
+def log_posterior_around(
+    changed: NDArray[np.int64],
+    tracks: Tracks,
+    labels: NDArray[np.int64],
+    model: TrackingModel,
+    shared: SharedAcceleration,
+) -> float:
+    """Return the log posterior of tracks with other labels, in the frames around some detections.
+
+    Parameters
+    ----------
+    changed : ndarray of int, shape (n,)
+        Detections in time order.
+    tracks : Tracks
+        Tracks of markers.
+    labels : ndarray of int, shape (N,)
+        Track of each detection, -1 for clutter.
+    model, shared
+        As for `log_posterior`.
+    """
+    d, margin = tracks.detections, AROUND + model.population.max_gap
+    first = max(int(d.frame_of[changed[0]]) - margin, 0)
+    end = min(int(d.frame_of[changed[-1]]) + margin + 1, d.n_frames)
+    part = Tracks(detections=d.part(first, end), labels=labels[d.offsets[first] : d.offsets[end]])
+    return log_posterior(part, model, shared)
 
 
 def within_limits(tracks: Tracks, model: TrackingModel) -> Tracks:

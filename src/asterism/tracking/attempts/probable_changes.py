@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.model import Tracks
-from asterism.tracking.attempts.posterior import log_posterior
+from asterism.tracking.attempts.posterior import log_posterior, log_posterior_around
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,10 +19,6 @@ if TYPE_CHECKING:
     from asterism.model import SharedAcceleration, TrackingModel
 
 __all__ = ["probable_changes"]
-
-AROUND = 50
-"""Number of frames, besides the longest gap, before and after a change in which its probability is
-compared. By then the filter has forgotten it."""
 
 
 def probable_changes(
@@ -61,9 +57,9 @@ def probable_changes(
         before = labels.copy()
         before[change] = given[change]
         is_loss = (labels[change] < 0).all()
-        if is_loss or _around(change, tracks, before, model, shared) >= _around(
-            change, tracks, labels, model, shared
-        ):
+        if is_loss or log_posterior_around(
+            change, tracks, before, model, shared
+        ) >= log_posterior_around(change, tracks, labels, model, shared):
             labels = before
     is_bonded = np.diff(shared.offsets) > 0
     is_bonded[shared.others] = True
@@ -72,31 +68,16 @@ def probable_changes(
         if (labels[tracklet] >= 0).any() or (given[tracklet] >= 0).any():
             continue
         present = labels[np.isin(frame_of, frame_of[tracklet])]
-        best, most = labels, _around(tracklet, tracks, labels, model, shared)
+        best, most = labels, log_posterior_around(tracklet, tracks, labels, model, shared)
         most += max(_of_no_marker(tracklet, tracks, model), 0.0)
         for marker in np.setdiff1d(with_bonds, present):
             other = labels.copy()
             other[tracklet] = marker
-            probability = _around(tracklet, tracks, other, model, shared)
+            probability = log_posterior_around(tracklet, tracks, other, model, shared)
             if probability > most:
                 best, most = other, probability
         labels = best
     return labels
-
-
-def _around(
-    changed: NDArray[np.int64],
-    tracks: Tracks,
-    labels: NDArray[np.int64],
-    model: TrackingModel,
-    shared: SharedAcceleration,
-) -> float:
-    """Return the log posterior with other labels in the frames around some, in time order."""
-    d, margin = tracks.detections, AROUND + model.population.max_gap
-    first = max(int(d.frame_of[changed[0]]) - margin, 0)
-    end = min(int(d.frame_of[changed[-1]]) + margin + 1, d.n_frames)
-    part = Tracks(detections=d.part(first, end), labels=labels[d.offsets[first] : d.offsets[end]])
-    return log_posterior(part, model, shared)
 
 
 def _of_no_marker(tracklet: NDArray[np.int64], tracks: Tracks, model: TrackingModel) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
@@ -20,13 +21,19 @@ if TYPE_CHECKING:
 __all__ = ["exchanged_back", "exchanged_by_distances", "with_markers"]
 
 P = TypeVar("P", "Pass", "Stitching")
+Accepts = Callable[["NDArray[np.int64]", "NDArray[np.int64]", "NDArray[np.int64]"], bool]
 
 ROUNDS = 5
 """Largest number of times that stretches are searched. Three markers in turn take two."""
 
 
 def exchanged_back(
-    d: Detections, labels: NDArray[np.int64], model: TrackingModel, *, by_spreads: bool = False
+    d: Detections,
+    labels: NDArray[np.int64],
+    model: TrackingModel,
+    *,
+    by_spreads: bool = False,
+    accepts: Accepts | None = None,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Exchange tracks back where the distances to others show that they have each other's marker.
 
@@ -46,6 +53,10 @@ def exchanged_back(
         Whether pairs are included whose distances have the same medians and different spreads, as
         those of an ankle and a toe to the knee. The spreads of a track that is on several markers
         are large too, so that this is for tracks that are otherwise final.
+    accepts : callable, optional
+        Called with the labels before and after an exchange and with the exchanged detections;
+        returns whether it is made. With it, pairs by spreads are included, as are stretches whose
+        exchange fits the motion better at both edges while the distances say little.
 
     Returns
     -------
@@ -67,19 +78,20 @@ def exchanged_back(
             motion, d.times, kind, F, Q, np.ascontiguousarray(d.points[order]),
             d.frame_of[order].astype(np.int64), offsets, is_examined,
             p_detection=min(model.sensor.p_detection, 0.999), noise=model.sensor.noise_sigma,
-            by_spreads=by_spreads,
+            by_spreads=by_spreads, by_motion=accepts is not None,
         )  # fmt: skip
         is_examined = np.zeros(n_tracks, dtype=bool)
         for i in np.argsort(-gains, kind="stable"):
             pair = tracks[i]
             if is_examined[pair].any():  # in the next round
                 continue
-            is_examined[pair] = True
-            inside = slice(*d.offsets[stretches[i]])
-            own = labels[inside]
-            is_one, is_other = own == pair[0], own == pair[1]
-            own[is_one], own[is_other] = pair[1], pair[0]
-            log_odds[inside][is_one | is_other] = gains[i]
+            begin, end = d.offsets[stretches[i]]
+            changed = begin + np.flatnonzero(np.isin(labels[begin:end], pair))
+            after = labels.copy()
+            after[changed] = pair.sum() - labels[changed]
+            if accepts is not None and not accepts(labels, after, changed):
+                continue
+            labels, log_odds[changed], is_examined[pair] = after, gains[i], True
         if not is_examined.any():
             break
     return labels, log_odds
