@@ -187,6 +187,8 @@ def _with_lost_markers(found: Uncorrected) -> Uncorrected:
 def searched_again(found: Uncorrected, progress: Callable[[int], Any] | None) -> Uncorrected:
     """Search with the shared accelerations of the tracks, and assign all detections once more.
 
+    Naming the tracks of a search by distances learnt from them loses more identities than it mends.
+
     Parameters
     ----------
     found : Uncorrected
@@ -199,7 +201,7 @@ def searched_again(found: Uncorrected, progress: Callable[[int], Any] | None) ->
         threads=found.recipe.options.get("threads", 1), progress=progress,
     )  # fmt: skip
     n_refined = int(found.tracks.info.get("refinements", 0))
-    return assigned_again(refined_by_own_distances(_with_labels(found, labels, n_refined)))
+    return assigned_again(_with_labels(found, labels, n_refined))
 
 
 def exchanged_by_spreads(found: Uncorrected) -> Uncorrected:
