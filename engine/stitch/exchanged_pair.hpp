@@ -240,8 +240,7 @@ class ExchangedPair {
   // are most probable by it.
   bool weigh() {
     learn();
-    const bool is_known = known_.size() >= kMinReferences;
-    if (!is_known && !by_motion_) return false;
+    if (known_.size() < kMinReferences && !by_motion_) return false;
     evidence_.assign(frames_.size(), 0);
     for (std::size_t u = 0; u < frames_.size(); ++u) {
       const Point *a = all_.find(one_, frames_[u]), *b = all_.find(other_, frames_[u]);
@@ -258,7 +257,7 @@ class ExchangedPair {
       }
       evidence_[u] = kWeight * sum;
     }
-    decode(is_known);
+    decode();
     const auto n = static_cast<std::size_t>(std::ranges::count(is_exchanged_, 1));
     if (2 * n > frames_.size())
       for (std::size_t u = 0; u < frames_.size(); ++u) {
@@ -322,12 +321,11 @@ class ExchangedPair {
             std::max(one.gain, 0.0);
     }
   }
-  // The most probable sequence of states (Viterbi). With too few known distances it begins and ends
-  // with no exchange.
-  void decode(bool is_known) {
+  // The most probable sequence of states (Viterbi), each change of which has a cost.
+  void decode() {
     const std::size_t U = frames_.size();
     came_from_.assign(U, {0, 1});
-    double kept = 0, exchanged = is_known ? 0 : -kInfinite;
+    double kept = 0, exchanged = 0;
     for (std::size_t u = 0; u < U; ++u) {
       const double stays_kept = kept, stays_exchanged = exchanged;
       if (stays_exchanged + changes_[u] > stays_kept) {
@@ -340,7 +338,7 @@ class ExchangedPair {
       }
       exchanged += evidence_[u];
     }
-    char state = is_known && exchanged > kept;
+    char state = exchanged > kept;
     for (std::size_t u = U; u-- > 0;) {
       is_exchanged_[u] = state;
       state = came_from_[u][static_cast<std::size_t>(state)];

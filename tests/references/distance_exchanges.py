@@ -43,15 +43,15 @@ def sampled(rows):
     return rows[np.arange(n) * len(rows) // n]
 
 
-def decoded(evidence, changes, is_known):
+def decoded(evidence, changes):
     """The most probable states by trying, for each frame, both states before it."""
-    score, paths = [0.0, 0.0 if is_known else -np.inf], [[], []]
+    score, paths = [0.0, 0.0], [[], []]
     for e, change in zip(evidence, changes, strict=True):
         best = [max((0, 1), key=lambda s, to=to: score[s] + change * (s != to) + 1e-12 * (s == to))
                 for to in (0, 1)]  # fmt: skip
         paths = [[*paths[best[to]], to] for to in (0, 1)]
         score = [score[best[to]] + change * (best[to] != to) + e * to for to in (0, 1)]
-    return np.array(paths[int(is_known and score[1] > score[0])])
+    return np.array(paths[int(score[1] > score[0])])
 
 
 def log_ratio(distance, middle, variance, against, its_variance):
@@ -132,8 +132,7 @@ def stretches(positions, noise, motion, by_spreads=False, exchanges=None):
                 if divergence > (CONTRAST**2 if by_middles else DIVERGENCE):
                     known.append((-divergence, candidates[r], r, m, v, n, w))
             known = sorted(known)[:REFERENCES]
-            is_known = len(known) >= 2
-            if not is_known and not by_motion:
+            if len(known) < 2 and not by_motion:
                 evidence = None
                 break
             has_both = np.isin(np.arange(len(frames)), together)
@@ -142,7 +141,7 @@ def stretches(positions, noise, motion, by_spreads=False, exchanges=None):
                 v, w = (np.where(has_both, x, max(v, w)) for x in (v, w))
                 evidence += WEIGHT * log_ratio(of_a[:, r], n, w, m, v)
                 evidence += WEIGHT * log_ratio(of_b[:, r], m, v, n, w)
-            state = decoded(evidence, changes, is_known)
+            state = decoded(evidence, changes)
             if 2 * state.sum() > len(state):
                 state, evidence = 1 - state, -evidence
         if evidence is None:

@@ -179,6 +179,15 @@ def test_an_exchange_of_tracks_with_the_same_distances_is_undone_by_the_motion(s
     assert (log_odds[wrong != truth.labels] > 6).all()
 
 
+@pytest.mark.parametrize("stretch", [range(150), range(250, 400)])
+def test_tracks_with_the_same_distances_are_joined_by_the_motion_at_one_edge(stretch):
+    truth = two_that_circle(1)
+    d, model = truth.detections, model_of(truth.detections)
+    wrong = exchanged(truth, (5, 6), stretch).labels.astype(np.int64)
+    labels, _ = exchanged_back(d, wrong, model, accepts=always)
+    assert am.evaluate(am.Tracks(detections=d, labels=labels), truth).idf1 == 1
+
+
 def test_an_exchange_is_made_if_it_is_accepted():
     truth = two_that_circle(1)
     wrong = exchanged(truth, (5, 6), range(150, 260)).labels.astype(np.int64)
