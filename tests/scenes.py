@@ -168,3 +168,15 @@ def steady_and_loose(seed, until=300):
     positions += rng.normal(0, 1e-3, positions.shape)
     positions[95:115, 5:] = positions[until - 5 : until + 15, 5:] = np.nan
     return am.Tracks.from_dense(t, positions, tuple("ABCDESL"))
+
+
+def two_that_circle(seed, radius=0.1):
+    """A rod of five markers, and two that circle around it with the same distances to it."""
+    rng = np.random.default_rng(seed)
+    angle = 3 * np.arange(400) * 0.01 + rng.uniform(0, 6)
+    circle = radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    middle = np.array([0, 0, 0.2])
+    rod = [np.tile(0.5 * k * middle, (400, 1)) for k in range(5)]
+    positions = np.stack([*rod, middle + circle, middle - circle], axis=1)
+    positions += rng.normal(0, 1e-3, positions.shape)
+    return am.Tracks.from_dense(np.arange(400) * 0.01, positions, tuple("ABCDEFG"))

@@ -83,7 +83,7 @@ class ExchangedPair {
   static constexpr double kMinContrast = 2;     // smallest difference of medians, in deviations
   static constexpr double kMinDivergence = 1;   // smallest one of the distances of both tracks, nats
   static constexpr double kMinTogether = 0.25;  // share of a stretch with both tracks, if by spreads
-  static constexpr std::size_t kMinFrames = 4;  // of a stretch by motion; its edges are independent
+  static constexpr std::size_t kMinFrames = 4;  // of a stretch by motion
   static constexpr int kRounds = 2;             // of learning the distances, at most
   static constexpr int kMoreRounds = 5;         // the same by spreads, from no exchange on
   static constexpr double kMinNoise = 2e-3;     // metres
@@ -307,18 +307,24 @@ class ExchangedPair {
     const double bend = kBend * own.middle;
     return {own.middle, own.spread * own.spread + floor2_ + bend * bend};
   }
-  // What a change of the state before each frame adds.
+  // What a change of the state before each frame adds. Often the frames around an exchange fit it as
+  // well; that which fits best counts.
   void weigh_changes(std::span<const Exchange> exchanges) {
-    changes_.assign(frames_.size(), -kChange);
+    const std::size_t U = frames_.size();
+    fits_.assign(U, 0);
     for (const Exchange& one : exchanges) {
       bool is_linked = true;
       for (const int side : {0, 1}) {
         const auto n = static_cast<std::int64_t>(all_.frames(one.track[side]).size());
         is_linked = is_linked && one.tail[side] > 0 && one.tail[side] < n;
       }
-      if (is_linked)
-        changes_[std::ranges::lower_bound(frames_, one.frame) - frames_.begin()] +=
-            std::max(one.gain, 0.0);
+      if (is_linked) fits_[std::ranges::lower_bound(frames_, one.frame) - frames_.begin()] = one.gain;
+    }
+    changes_.assign(U, -kChange);
+    for (std::size_t u = 0; u < U; ++u) {
+      const auto near = std::span(fits_).subspan(u - std::min(u, kMinFrames - 1));
+      const std::size_t n = std::min(near.size(), std::min(u, kMinFrames - 1) + kMinFrames);
+      if (fits_[u] > 0 && fits_[u] == std::ranges::max(near.first(n))) changes_[u] += fits_[u];
     }
   }
   // The most probable sequence of states (Viterbi), each change of which has a cost.
@@ -375,12 +381,12 @@ class ExchangedPair {
     std::vector<Edge> found;
     const std::size_t low = at > kMoved ? at - kMoved : 1, high = std::min(at + kMoved, U - 1);
     for (std::size_t u = low; u <= high; ++u)
-      if (const double ratio = by_motion(motion, frames_[u]); ratio > kMinMotion)
+      if (const double ratio = motion_ratio(motion, frames_[u]); ratio > kMinMotion)
         found.push_back({u, ratio});
     return found;
   }
   // Log-likelihood ratio of the exchange of the tails from frame t on.
-  double by_motion(const ExchangeSearch& motion, std::int64_t t) const {
+  double motion_ratio(const ExchangeSearch& motion, std::int64_t t) const {
     std::array<bool, 2> is_linked{};
     std::int64_t gap = 0;
     const std::array<std::int32_t, 2> own{one_, other_};
@@ -404,7 +410,7 @@ class ExchangedPair {
   std::vector<std::int64_t> frames_;     // with a detection of at least one track
   std::vector<std::size_t> together_;    // indices of those with both
   std::vector<char> is_exchanged_, before_;  // in each of `frames`, and before a round
-  std::vector<double> evidence_, sums_, changes_;  // of each of them, and before each
+  std::vector<double> evidence_, sums_, fits_, changes_;  // of each of them, and before each
   std::vector<std::int32_t> references_;
   bool by_middles_ = true;  // whether the middles of the distances differ enough
   std::vector<Known> known_;

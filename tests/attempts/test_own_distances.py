@@ -14,7 +14,7 @@ from asterism.tracking.attempts.uncorrected import Uncorrected
 from asterism.tracking.methods import TOMHT, Rigidity, options_of
 from asterism.tracking.plan import plan_tracking
 from asterism.tracking.stitching.exchanged import with_markers
-from tests.scenes import exchanged
+from tests.scenes import exchanged, two_that_circle
 
 HIDDEN, FIRST, LAST = (3, 4), 60, 100
 
@@ -43,7 +43,7 @@ def followed_through_a_gap():
     return person, Uncorrected(tracks=tracks, recipe=recipe, model=model, stitching=stitching)
 
 
-@pytest.mark.parametrize(("is_doubtful", "lead"), [(True, 20), (True, 1e4), (False, 20)])
+@pytest.mark.parametrize(("is_doubtful", "lead"), [(True, 30), (True, 1e6), (False, 30)])
 def test_tracks_in_doubt_are_exchanged_back_where_that_is_more_probable(
     is_doubtful, lead, monkeypatch
 ):
@@ -51,14 +51,17 @@ def test_tracks_in_doubt_are_exchanged_back_where_that_is_more_probable(
         "asterism.tracking.attempts.uncorrected.DOUBTFUL", -1.0 if is_doubtful else 1.0
     )
     monkeypatch.setattr(own_distances, "EXCHANGE", lead)
-    person, found = followed_through_a_gap()
-    right = am.stitch(person, found.model)
-    pair = [int(right.tracks.labels[person.labels == k][0]) for k in HIDDEN]
+    truth = two_that_circle(seed=1)
+    recipe = plan_tracking(truth.detections).recipe
+    right = am.stitch(truth, am.tracking.tracklet_model(recipe.model))
+    pair = [int(right.tracks.labels[truth.labels == k][0]) for k in (5, 6)]
     wrong = exchanged(right.tracks, pair, range(FIRST, LAST))
     stitching = with_markers(right, wrong.labels, np.full(len(wrong.labels), 0.95))
-    before = dataclasses.replace(found, tracks=wrong, stitching=stitching)
+    model = am.tracking.tracklet_model(recipe.model)
+    before = Uncorrected(tracks=wrong, recipe=recipe, model=model, stitching=stitching)
+    assert own_distances.exchanged_by_spreads(before) is before
     after = own_distances.exchanged_if_more_probable(before)
-    if not is_doubtful or lead > 20:
+    if not is_doubtful or lead > 30:
         assert after is before
     else:
         np.testing.assert_array_equal(after.tracks.labels, right.tracks.labels)

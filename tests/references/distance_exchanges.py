@@ -113,7 +113,10 @@ def stretches(positions, noise, motion, by_spreads=False, exchanges=None):
         changes = np.full(len(frames), -CHANGE)
         if by_motion:
             of_pair = exchanges.get((a, b), {})
-            changes += [max(of_pair.get(t, 0.0), 0.0) for t in frames]
+            fits = np.array([max(of_pair.get(t, 0.0), 0.0) for t in frames])
+            for u, fit in enumerate(fits):
+                near = fits[max(u - SHORTEST + 1, 0) : u + SHORTEST]
+                changes[u] += fit if fit == near.max() else 0.0
         evidence = None
         for _ in range(2 if by_middles else ROUNDS):
             some = sampled(np.arange(len(frames)))

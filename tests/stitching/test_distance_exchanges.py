@@ -16,7 +16,7 @@ from asterism.tracking.stitching.exchanged import (
 )
 from asterism.tracking.stitching.passes import Pass
 from tests.references.distance_exchanges import stretches
-from tests.scenes import exchanged, sized, steady_and_loose
+from tests.scenes import exchanged, sized, steady_and_loose, two_that_circle
 
 NOISE = 1e-3
 
@@ -155,18 +155,6 @@ def test_an_exchange_is_undone_by_the_spreads_of_distances(seed):
     assert (log_odds[wrong != truth.labels] > 6).all()
 
 
-def two_that_circle(seed):
-    """A rod of five markers, and two that circle around it with the same distances to it."""
-    rng = np.random.default_rng(seed)
-    angle = 3 * np.arange(400) * 0.01 + rng.uniform(0, 6)
-    circle = 0.1 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-    middle = np.array([0, 0, 0.2])
-    rod = [np.tile(0.5 * k * middle, (400, 1)) for k in range(5)]
-    positions = np.stack([*rod, middle + circle, middle - circle], axis=1)
-    positions += rng.normal(0, NOISE, positions.shape)
-    return am.Tracks.from_dense(np.arange(400) * 0.01, positions, tuple("ABCDEFG"))
-
-
 @pytest.mark.parametrize("seed", range(sized(4, 1)))
 def test_an_exchange_of_tracks_with_the_same_distances_is_undone_by_the_motion(seed):
     truth = two_that_circle(seed)
@@ -177,6 +165,19 @@ def test_an_exchange_of_tracks_with_the_same_distances_is_undone_by_the_motion(s
     labels, log_odds = exchanged_back(d, wrong, model, accepts=always)
     assert np.array_equal(labels, truth.labels)
     assert (log_odds[wrong != truth.labels] > 6).all()
+
+
+def test_exchanges_that_fit_the_motion_in_several_frames_are_undone():
+    """Close together, where detections are missing, as much as the edges of a stretch."""
+    n_undone = 0
+    for seed in range(12):
+        truth = am.simulate.corrupt(two_that_circle(seed, radius=0.01), missing=0.1, seed=seed)
+        d, model = truth.detections, model_of(truth.detections)
+        first, n = np.random.default_rng(seed).integers((60, 20), (200, 150))
+        wrong = exchanged(truth, (5, 6), range(first, first + n)).labels.astype(np.int64)
+        labels, _ = exchanged_back(d, wrong, model, accepts=always)
+        n_undone += am.evaluate(am.Tracks(detections=d, labels=labels), truth).idf1 == 1
+    assert n_undone == 12
 
 
 @pytest.mark.parametrize("stretch", [range(150), range(250, 400)])

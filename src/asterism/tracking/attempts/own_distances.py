@@ -45,7 +45,7 @@ MARKERS = range(4, 201)
 """Number of markers of such a set. With fewer, distances are ambiguous; the time of naming grows
 with the square of the number."""
 
-EXCHANGE = 20.0
+EXCHANGE = 30.0
 """Log odds by the posterior with shared accelerations from which tracks are exchanged."""
 
 
@@ -187,8 +187,6 @@ def _with_lost_markers(found: Uncorrected) -> Uncorrected:
 def searched_again(found: Uncorrected, progress: Callable[[int], Any] | None) -> Uncorrected:
     """Search with the shared accelerations of the tracks, and assign all detections once more.
 
-    Naming the tracks of a search by distances learnt from them loses more identities than it mends.
-
     Parameters
     ----------
     found : Uncorrected
@@ -201,6 +199,7 @@ def searched_again(found: Uncorrected, progress: Callable[[int], Any] | None) ->
         threads=found.recipe.options.get("threads", 1), progress=progress,
     )  # fmt: skip
     n_refined = int(found.tracks.info.get("refinements", 0))
+    # `refined_by_own_distances` would lose more identities than it mends here.
     return assigned_again(_with_labels(found, labels, n_refined))
 
 
@@ -216,21 +215,15 @@ def exchanged_by_spreads(found: Uncorrected) -> Uncorrected:
     found : Uncorrected
         Tracks without names.
     """
-    tracks = found.tracks
-    if found.stitching is None or not found.is_doubtful:
-        return found
-    labels, _ = exchanged_back(tracks.detections, tracks.labels, found.model, by_spreads=True)
-    if np.array_equal(labels, tracks.labels):
-        return found
-    return _with_labels(found, labels, int(tracks.info.get("refinements", 0)))
+    return _exchanged(found, by_spreads=True) if found.is_doubtful else found
 
 
 def exchanged_if_more_probable(found: Uncorrected) -> Uncorrected:
-    """Exchange tracks back where motion tells that they have each other's marker, if in doubt.
+    """Exchange tracks back whose motion shows that they have each other's marker, if in doubt.
 
     The motion at the edges of the exchange must favour it together with the distances, and the log
-    posterior with shared accelerations as well. It is for final tracks: the confidence hardly sees
-    such an exchange, so that it could not compare the attempts that follow.
+    posterior with shared accelerations must rise by `EXCHANGE`. It is for tracks that no attempt
+    follows: the confidence hardly sees such an exchange, so that it could not compare them.
 
     Parameters
     ----------
@@ -238,7 +231,7 @@ def exchanged_if_more_probable(found: Uncorrected) -> Uncorrected:
         Tracks without names.
     """
     tracks, model = found.tracks, found.model
-    if found.stitching is None or not found.is_doubtful or not has_own_distances(found):
+    if not found.is_doubtful or not has_own_distances(found):
         return found
     shared = learn_shared_acceleration(tracks, model)
 
@@ -251,7 +244,14 @@ def exchanged_if_more_probable(found: Uncorrected) -> Uncorrected:
         )
         return with_it > without + EXCHANGE
 
-    labels, _ = exchanged_back(tracks.detections, tracks.labels, model, accepts=accepts)
+    return _exchanged(found, accepts=accepts)
+
+
+def _exchanged(found: Uncorrected, **options: Any) -> Uncorrected:
+    tracks = found.tracks
+    if found.stitching is None:
+        return found
+    labels, _ = exchanged_back(tracks.detections, tracks.labels, found.model, **options)
     if np.array_equal(labels, tracks.labels):
         return found
     return _with_labels(found, labels, int(tracks.info.get("refinements", 0)))

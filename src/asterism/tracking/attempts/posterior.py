@@ -27,8 +27,8 @@ def log_posterior(
 ) -> float:
     """Return the log posterior of tracks, where track k is of marker k.
 
-    Tracks are cut at the gaps and speeds that the model excludes. One that it excludes otherwise
-    counts as clutter.
+    Tracks are cut at the gaps and speeds that the model excludes. The score of one that it excludes
+    otherwise is left out.
 
     Parameters
     ----------

@@ -55,8 +55,8 @@ def exchanged_back(
         are large too, so that this is for tracks that are otherwise final.
     accepts : callable, optional
         Called with the labels before and after an exchange and with the exchanged detections;
-        returns whether it is made. With it, pairs by spreads are included, as are stretches whose
-        exchange fits the motion better at both edges while the distances say little.
+        returns whether it is made. With it, pairs by spreads are included, and stretches that are
+        found by the motion at their edges where the distances hardly differ.
 
     Returns
     -------
