@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 import asterism as am
-from asterism.tracking.attempts.posterior import log_posterior, within_limits
+from asterism.tracking.attempts.posterior import (
+    log_posterior,
+    log_posterior_around,
+    within_limits,
+)
 from asterism.tracking.attempts.probable_changes import _labels_of_markers, probable_changes
 
 TRUTH = am.simulate.corrupt(
@@ -99,6 +103,23 @@ def test_the_posterior_is_that_of_the_pieces_between_excluded_gaps():
     assert log_posterior(cut, MODEL) == am.log_posterior(pieces, MODEL)
     assert log_posterior(cut, MODEL, SHARED) == pytest.approx(expected)
     assert log_posterior(cut, MODEL, SHARED) < log_posterior(TRUTH, MODEL, SHARED)
+
+
+@pytest.mark.parametrize("begin", [0, 40, 100])
+def test_the_posterior_around_a_change_differs_as_much_as_that_of_the_whole(begin):
+    wrong = exchanged(LABELS, 3, 5, begin, begin + 4)
+    changed = np.flatnonzero(wrong != LABELS)
+    whole, around = (
+        [posterior(labels) for labels in (LABELS, wrong)]
+        for posterior in (
+            lambda labels: log_posterior(
+                am.Tracks(detections=TRUTH.detections, labels=labels), MODEL, SHARED
+            ),
+            lambda labels: log_posterior_around(changed, TRUTH, labels, MODEL, SHARED),
+        )
+    )
+    assert around[0] != pytest.approx(whole[0])  # not of all frames
+    assert around[0] - around[1] == pytest.approx(whole[0] - whole[1], abs=0.01)
 
 
 def test_tracklets_are_of_the_first_label_given_to_them():

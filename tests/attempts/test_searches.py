@@ -53,3 +53,13 @@ def test_a_search_is_kept_if_more_are_right(found, n_kept, n_made, monkeypatch):
     assert len(made) == n_made
     assert best.tracks.info.get("searches", 0) == n_kept
     assert best.expected_right == (found[n_kept - 1][0] if n_kept else 100)
+
+
+def test_tracks_are_exchanged_after_all_searches(monkeypatch):
+    steps = []
+    for name in ("_after_searches", "exchanged_if_more_probable"):
+        monkeypatch.setattr(
+            most_certain, name, lambda found, *_, name=name: (steps.append(name), found)[1]
+        )
+    am.track(am.simulate.person(frames=40, seed=1).detections)
+    assert steps == ["_after_searches", "exchanged_if_more_probable"]
