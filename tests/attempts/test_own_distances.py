@@ -60,7 +60,7 @@ def test_tracks_in_doubt_are_exchanged_back_where_that_is_more_probable(
     model = am.tracking.tracklet_model(recipe.model)
     before = Uncorrected(tracks=wrong, recipe=recipe, model=model, stitching=stitching)
     assert own_distances.exchanged_by_spreads(before) is before
-    after = own_distances.exchanged_if_more_probable(before)
+    after = own_distances.changed_if_more_probable(before)
     if not is_doubtful or lead > 30:
         assert after is before
     else:

@@ -57,9 +57,9 @@ def test_a_search_is_kept_if_more_are_right(found, n_kept, n_made, monkeypatch):
 
 def test_tracks_are_exchanged_after_all_searches(monkeypatch):
     steps = []
-    for name in ("_after_searches", "exchanged_if_more_probable"):
+    for name in ("_after_searches", "changed_if_more_probable"):
         monkeypatch.setattr(
             most_certain, name, lambda found, *_, name=name: (steps.append(name), found)[1]
         )
     am.track(am.simulate.person(frames=40, seed=1).detections)
-    assert steps == ["_after_searches", "exchanged_if_more_probable"]
+    assert steps == ["_after_searches", "changed_if_more_probable"]

@@ -14,7 +14,7 @@ from asterism.tracking.attempts.attempt import attempt, next_pass
 from asterism.tracking.attempts.halves import Halves
 from asterism.tracking.attempts.own_distances import (
     assigned_again,
-    exchanged_if_more_probable,
+    changed_if_more_probable,
     has_own_distances,
     refined_by_own_distances,
     searched_again,
@@ -83,7 +83,7 @@ def most_certain(
     Then further passes follow (`next_pass`), until one is not more certain. The best is
     `assigned_again`. If it has bonds and identities are still uncertain, so is an attempt with the
     motion in tracks of single frames, and the more certain of both is the result. It is
-    `searched_again` while it is uncertain, and then `exchanged_if_more_probable`. If it still is
+    `searched_again` while it is uncertain, and then `changed_if_more_probable`. If it still is
     uncertain, and detections are more probable without the motion that most markers have in common,
     all this is done without it, which must be more certain by `DOUBTFUL`. For `progress`, the first
     method is half of the work, and every other attempt, pass or search half of what is left.
@@ -115,7 +115,7 @@ def most_certain(
             best = _more_certain(best, assigned_again(bodies), 0)
     else:
         best = assigned_again(refined_by_own_distances(first))
-    best = exchanged_if_more_probable(_after_searches(best, parts.next))
+    best = changed_if_more_probable(_after_searches(best, parts.next))
     if best.is_doubtful and is_first and not recipe.common_motion:
         still = _attempt_without_common_motion(recipe, detections, parts.next())
         if still is not None:

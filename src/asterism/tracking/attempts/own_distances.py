@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asterism.metrics import oracle_tracks
+from asterism.tracking.attempts.fragments import with_moved_fragments
 from asterism.tracking.attempts.in_gaps import MAX_CELLS, with_detections_in_gaps
 from asterism.tracking.attempts.lost import with_lost_markers
 from asterism.tracking.attempts.posterior import log_posterior_around
@@ -29,8 +30,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "assigned_again",
+    "changed_if_more_probable",
     "exchanged_by_spreads",
-    "exchanged_if_more_probable",
     "has_own_distances",
     "refined_by_own_distances",
     "searched_again",
@@ -218,33 +219,37 @@ def exchanged_by_spreads(found: Uncorrected) -> Uncorrected:
     return _exchanged(found, by_spreads=True) if found.is_doubtful else found
 
 
-def exchanged_if_more_probable(found: Uncorrected) -> Uncorrected:
-    """Exchange tracks back whose motion shows that they have each other's marker, if in doubt.
+def changed_if_more_probable(found: Uncorrected) -> Uncorrected:
+    """Exchange tracks back and move fragments by the log posterior, if identities are in doubt.
 
-    The motion at the edges of the exchange must favour it together with the distances, and the log
-    posterior with shared accelerations must rise by `EXCHANGE`. It is for tracks that no attempt
-    follows: the confidence hardly sees such an exchange, so that it could not compare them.
+    The motion at the edges of an exchange must favour it together with the distances, and the log
+    posterior with shared accelerations must rise by `EXCHANGE`. Then fragments move to the markers
+    that they are of (`with_moved_fragments`). This is for tracks that no attempt follows: the
+    confidence hardly sees such an exchange, so that it could not compare them.
 
     Parameters
     ----------
     found : Uncorrected
         Tracks without names.
     """
-    tracks, model = found.tracks, found.model
     if not found.is_doubtful or not has_own_distances(found):
         return found
-    shared = learn_shared_acceleration(tracks, model)
+    model = found.model
+    shared = learn_shared_acceleration(found.tracks, model)
 
     def accepts(
         before: NDArray[np.int64], after: NDArray[np.int64], changed: NDArray[np.int64]
     ) -> bool:
         with_it, without = (
-            log_posterior_around(changed, tracks, labels, model, shared)
+            log_posterior_around(changed, found.tracks, labels, model, shared)
             for labels in (after, before)
         )
         return with_it > without + EXCHANGE
 
-    return _exchanged(found, accepts=accepts)
+    exchanged = _exchanged(found, accepts=accepts)
+    if exchanged is not found:
+        shared = learn_shared_acceleration(exchanged.tracks, model)
+    return _changed(exchanged, with_moved_fragments(exchanged.tracks, model, shared))
 
 
 def _exchanged(found: Uncorrected, **options: Any) -> Uncorrected:
@@ -252,9 +257,14 @@ def _exchanged(found: Uncorrected, **options: Any) -> Uncorrected:
     if found.stitching is None:
         return found
     labels, _ = exchanged_back(tracks.detections, tracks.labels, found.model, **options)
-    if np.array_equal(labels, tracks.labels):
+    return _changed(found, labels)
+
+
+def _changed(found: Uncorrected, labels: NDArray[np.int64]) -> Uncorrected:
+    """Return a result with other labels, or itself if they are the same."""
+    if np.array_equal(labels, found.tracks.labels):
         return found
-    return _with_labels(found, labels, int(tracks.info.get("refinements", 0)))
+    return _with_labels(found, labels, int(found.tracks.info.get("refinements", 0)))
 
 
 def _with_labels(found: Uncorrected, labels: NDArray[np.int64], n: int) -> Uncorrected:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.model import Tracks
+from asterism.tracking.attempts.absent_markers import AbsentMarkers
 from asterism.tracking.attempts.posterior import log_posterior, log_posterior_around
 
 if TYPE_CHECKING:
@@ -61,23 +62,14 @@ def probable_changes(
             change, tracks, before, model, shared
         ) >= log_posterior_around(change, tracks, labels, model, shared):
             labels = before
-    is_bonded = np.diff(shared.offsets) > 0
-    is_bonded[shared.others] = True
-    with_bonds = np.flatnonzero(is_bonded)
+    markers = AbsentMarkers(tracks, labels, model, shared)
     for tracklet in _groups(found):
         if (labels[tracklet] >= 0).any() or (given[tracklet] >= 0).any():
             continue
-        present = labels[np.isin(frame_of, frame_of[tracklet])]
-        best, most = labels, log_posterior_around(tracklet, tracks, labels, model, shared)
-        most += max(_of_no_marker(tracklet, tracks, model), 0.0)
-        for marker in np.setdiff1d(with_bonds, present):
-            other = labels.copy()
-            other[tracklet] = marker
-            probability = log_posterior_around(tracklet, tracks, other, model, shared)
-            if probability > most:
-                best, most = other, probability
-        labels = best
-    return labels
+        log_odds, marker = markers.best(tracklet)
+        if log_odds > max(_of_no_marker(tracklet, tracks, model), 0.0):
+            markers.move(tracklet, marker)
+    return markers.labels
 
 
 def _of_no_marker(tracklet: NDArray[np.int64], tracks: Tracks, model: TrackingModel) -> float:

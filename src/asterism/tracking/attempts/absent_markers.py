@@ -1,0 +1,120 @@
+"""Which of the markers that are absent meanwhile is that of some detections."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.tracking.attempts.posterior import log_posterior_around
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from asterism.model import SharedAcceleration, TrackingModel, Tracks
+
+__all__ = ["AbsentMarkers"]
+
+FARTHEST = 3.5
+"""Largest mean squared deviation, in variances, of the distances that detections have to the
+neighbours of a marker if they may be of this marker."""
+BOUND = 4.0
+"""Largest squared deviation of one distance. Distances to a wrong marker have hardly less."""
+COMPARED = 10
+"""Number of detections whose distances are compared."""
+
+
+class AbsentMarkers:
+    """The markers of tracks with bonds, and where they are absent.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks of markers.
+    labels : ndarray of int, shape (N,)
+        Marker of each detection, -1 for clutter.
+    model : TrackingModel
+        Model of the markers' own motion.
+    shared : SharedAcceleration
+        Shared accelerations of the markers.
+
+    Attributes
+    ----------
+    labels : ndarray of int, shape (N,)
+        Marker of each detection after all calls of `move`.
+    """
+
+    def __init__(
+        self,
+        tracks: Tracks,
+        labels: NDArray[np.int64],
+        model: TrackingModel,
+        shared: SharedAcceleration,
+    ) -> None:
+        self.labels = labels.copy()
+        self._tracks, self._model, self._shared = tracks, model, shared
+        d, K = tracks.detections, len(shared.weights)
+        self._positions = np.full((d.n_frames, K, d.n_axes), np.nan)
+        has = np.flatnonzero(labels >= 0)
+        self._positions[d.frame_of[has], labels[has]] = d.points[has]
+        later = np.repeat(np.arange(K), np.diff(shared.offsets))
+        marker = np.concatenate([later, shared.others])
+        self._bonds = [np.flatnonzero(marker == k) for k in range(K)]
+        self._other = np.concatenate([shared.others, later])
+        self._distance, self._variance = np.tile(shared.distances, 2), np.tile(shared.variances, 2)
+
+    def best(self, detections: NDArray[np.int64]) -> tuple[float, int]:
+        """Return the log odds of the most probable marker, and the marker.
+
+        They are the log posterior with the detections as this marker less that with their present
+        label; minus infinity if they can be of none.
+
+        Parameters
+        ----------
+        detections : ndarray of int, shape (n,)
+            Detections with the same label, in time order.
+        """
+        frames = self._tracks.detections.frame_of[detections]
+        is_absent = np.isnan(self._positions[frames, :, 0]).all(axis=0)
+        found, marker = -np.inf, -1
+        for k in np.flatnonzero(is_absent).tolist():
+            if self._deviation(k, detections) > FARTHEST:
+                continue
+            labels = self.labels.copy()
+            labels[detections] = k
+            log_posterior = self._log_posterior(detections, labels)
+            if log_posterior > found:
+                found, marker = log_posterior, k
+        if marker < 0:
+            return found, marker
+        return found - self._log_posterior(detections, self.labels), marker
+
+    def move(self, detections: NDArray[np.int64], marker: int) -> None:
+        """Give detections with the same label to a marker that is absent in their frames.
+
+        Parameters
+        ----------
+        detections : ndarray of int, shape (n,)
+            Detections.
+        marker : int
+            Marker.
+        """
+        d, own = self._tracks.detections, self.labels[detections[0]]
+        frames = d.frame_of[detections]
+        if own >= 0:
+            self._positions[frames, own] = np.nan
+        self._positions[frames, marker] = d.points[detections]
+        self.labels[detections] = marker
+
+    def _deviation(self, marker: int, detections: NDArray[np.int64]) -> float:
+        """Return the mean squared deviation of distances; infinity if none is known."""
+        some = detections[np.linspace(0, len(detections) - 1, COMPARED).astype(int)]
+        bonds, d = self._bonds[marker], self._tracks.detections
+        others = self._positions[d.frame_of[some]][:, self._other[bonds]]
+        apart = np.linalg.norm(others - d.points[some, None], axis=2)
+        squares = (apart - self._distance[bonds]) ** 2 / self._variance[bonds]
+        known = squares[np.isfinite(squares)]
+        return float(np.minimum(known, BOUND).mean()) if len(known) else np.inf
+
+    def _log_posterior(self, detections: NDArray[np.int64], labels: NDArray[np.int64]) -> float:
+        return log_posterior_around(detections, self._tracks, labels, self._model, self._shared)
