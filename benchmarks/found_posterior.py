@@ -1,11 +1,12 @@
-"""Log posterior of the tracks found by default against that of the truth, a piece at a time.
+"""Log posterior of the tracks found by default, against those of the truth and of other methods.
 
 Hard captures and simulated fingers with 10 % missing, 10 % clutter and 0.3 mm of noise, at the full
-and at half the rate. `track` without a method tracks each as a whole, and MCMCDA searches from
-there. Tracks and truth are cut into pieces of 100 frames, and at the gaps and speeds that the model
-excludes; the posterior is that of the model by which the tracks were made, alone and with the
-shared accelerations that are learnt from the found tracks, with which MCMCDA searches over the
-whole capture. A track that the model excludes otherwise counts as clutter.
+and at half the rate. `track` without a method tracks each as a whole; so do other methods, with the
+same model and stitching, and MCMCDA searches from the default. Tracks and truth are cut into pieces
+of 100 frames, and at the gaps and speeds that the model excludes; the posterior is that of the
+model by which the tracks were made, alone and with the shared accelerations that are learnt from
+the found tracks, with which MCMCDA searches over the whole capture. A track that the model excludes
+otherwise counts as clutter.
 
     python benchmarks/found_posterior.py [--data FOLDER] [--only NAME] [--markdown FILE]
 """
@@ -18,7 +19,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 import asterism as am
-from asterism.tracking.attempts.posterior import log_posterior, within_limits
+from asterism.tracking.attempts.posterior import within_limits
 from captures import captures, options_of_the_run
 from report import conditions, publish, table
 
@@ -28,19 +29,12 @@ if TYPE_CHECKING:
     from asterism.model import SharedAcceleration
 
 NAMES = ("racing", "freeform", "tennis")
+OTHERS = (am.GNN(), am.SMP(window=3), am.TOMHT(), am.MCMCDA())
 PIECE = 100
 NEAR = 1.0
 """Log posterior below that of the truth that still counts as reached, nats."""
 SHARED_MOVES = 20
 """Moves of MCMCDA with shared accelerations, each of which takes twenty times as long."""
-
-
-def differences(found: am.Tracks, truth: am.Tracks, model: am.TrackingModel) -> NDArray[Any]:
-    """Return the log posterior of each piece of the found tracks, less that of the truth."""
-    return np.array([
-        log_posterior(found.part(*ends), model) - log_posterior(truth.part(*ends), model)
-        for ends in pieces(truth)
-    ])  # fmt: skip
 
 
 def pieces(truth: am.Tracks) -> list[tuple[int, int]]:
@@ -49,29 +43,48 @@ def pieces(truth: am.Tracks) -> list[tuple[int, int]]:
     return [(first, min(first + PIECE, n)) for first in range(0, n - PIECE // 2, PIECE)]
 
 
-def shared_gains(
-    tracks: am.Tracks, model: am.TrackingModel, shared: SharedAcceleration, given: NDArray[Any]
+def log_posteriors(
+    tracks: am.Tracks,
+    model: am.TrackingModel,
+    shared: SharedAcceleration | None = None,
+    markers: NDArray[Any] | None = None,
 ) -> NDArray[Any]:
-    """Return what shared accelerations add to each piece; a track is of its first given label."""
-    cut = within_limits(tracks, model)
-    both = np.flatnonzero((cut.labels >= 0) & (given >= 0))
-    labelled, firsts = np.unique(cut.labels[both], return_index=True)
-    markers = np.full(cut.n_tracks, -1)
+    """Return the log posterior of each piece, with shared accelerations if markers are given.
+
+    `markers` has that of each detection; a track is of the marker of its first detection.
+    """
+    found = []
+    for first, end in pieces(tracks):
+        part = within_limits(tracks.part(first, end), model)
+        scores = am.model.track_scores(part, model)
+        total = float(scores[np.isfinite(scores)].sum())
+        if shared is not None and markers is not None:
+            order, offsets = part.by_track
+            begin = tracks.detections.offsets[first]
+            of_track = markers[begin + order[offsets[:-1]]]
+            total += float(am.model.shared_gains(part, model, shared, of_track).sum())
+        found.append(total)
+    return np.array(found)
+
+
+def first_labels(tracks: am.Tracks, given: NDArray[Any]) -> NDArray[Any]:
+    """Return for each detection the first label given to its track, -1 for none."""
+    both = np.flatnonzero((tracks.labels >= 0) & (given >= 0))
+    labelled, firsts = np.unique(tracks.labels[both], return_index=True)
+    markers = np.full(tracks.n_tracks + 1, -1)
     markers[labelled] = given[both[firsts]]
-    gains = am.model.shared_gains(cut, model, shared, markers)
-    frame_of = tracks.detections.frame_of
-    return np.array([gains[(frame_of >= a) & (frame_of < b)].sum() for a, b in pieces(tracks)])
+    return markers[tracks.labels]
 
 
-def labels_of(truth: am.Tracks, found: am.Tracks) -> NDArray[Any]:
-    """Return the labels of the truth, each track with that of the found one it shares most with."""
-    both = (truth.labels >= 0) & (found.labels >= 0)
-    shared = np.zeros((truth.n_tracks, found.n_tracks))
-    np.add.at(shared, (truth.labels[both], found.labels[both]), 1)
+def labels_of(tracks: am.Tracks, found: am.Tracks) -> NDArray[Any]:
+    """Return the labels of tracks, each that of the found track it has most detections of."""
+    both = (tracks.labels >= 0) & (found.labels >= 0)
+    shared = np.zeros((tracks.n_tracks, found.n_tracks))
+    np.add.at(shared, (tracks.labels[both], found.labels[both]), 1)
     rows, columns = linear_sum_assignment(-shared)
-    label = np.full(truth.n_tracks + 1, -1)
+    label = np.full(tracks.n_tracks + 1, -1)
     label[rows] = columns
-    return label[truth.labels]
+    return label[tracks.labels]
 
 
 def main() -> None:
@@ -102,17 +115,26 @@ def main() -> None:
             _, labels, _ = method.run(state, d)
             together = am.Tracks(detections=d, labels=labels)
             row = [name, rate, found.recipe.label, f"{am.evaluate(found, truth).idf1:.3f}"]
+            of_truth = log_posteriors(truth, model)
             for tracks in (found, alone):
-                row += summary(differences(tracks, truth, model))
-            of_truth = shared_gains(truth, model, shared, labels_of(truth, found))
-            for tracks in (found, alone, together):
-                gains = shared_gains(tracks, model, shared, found.labels)
-                row += summary(differences(tracks, truth, model) + gains - of_truth)
+                row += summary(log_posteriors(tracks, model) - of_truth)
+            of_truth = log_posteriors(truth, model, shared, labels_of(truth, found))
+            of_found = log_posteriors(found, model, shared, found.labels)
+            row += summary(of_found - of_truth)
+            for tracks in (alone, together):
+                markers = first_labels(tracks, found.labels)
+                row += summary(log_posteriors(tracks, model, shared, markers) - of_truth)
+            others = [am.track(d, other, model=found.recipe.model) for other in OTHERS]
+            of_others = [
+                log_posteriors(each, model, shared, labels_of(each, found)) for each in others
+            ]
+            row += summary(of_found - np.max(of_others, axis=0))
             rows.append(row)
             print(*rows[-1], sep=" | ", flush=True)
     head = ["capture", "rate", "method", "IDF1"]
     for which in ("found", "MCMCDA", "shared: found", "MCMCDA", "MCMCDA with shared"):
         head += [f"{which}: ≥ truth − 1", "median difference"]
+    head += ["shared: found: ≥ other methods − 1", "median difference"]
     publish([*table(head, rows), "", f"{conditions()}."], options.markdown)
 
 
