@@ -112,7 +112,7 @@ nb::tuple exchanged_stretches(const MotionModel& m, const In<double>& times,
                               const In<double>& Q, const In<double>& points,
                               const In<std::int64_t>& frames, const In<std::int64_t>& offsets,
                               const In<bool>& is_examined, double p_detection, double noise,
-                              bool by_spreads, bool by_motion) {
+                              ExchangeEvidence evidence) {
   require(p_detection >= 0 && p_detection < 1, "p_detection: from 0 to below 1");
   require(noise >= 0, "noise: at least 0");
   require(std::ranges::all_of(flat(points), [](double x) { return std::isfinite(x); }),
@@ -129,8 +129,7 @@ nb::tuple exchanged_stretches(const MotionModel& m, const In<double>& times,
     for (std::size_t k = 0; k < tracks.n_tracks(); ++k)
       distances.add(tracks.points_of(k), tracks.frames_of(k));
     distances.measure();
-    found = stretches_of_pairs(distances, m, line, p_detection, noise, by_spreads, by_motion,
-                               examined);
+    found = stretches_of_pairs(distances, m, line, p_detection, noise, evidence, examined);
   }
   Owned<std::int64_t> own(2 * found.size()), stretch(2 * found.size());
   for (std::size_t i = 0; i < found.size(); ++i) {
@@ -363,9 +362,13 @@ void bind_stitcher(nb::module_& module) {
           "labels"_a, "before"_a, "weights"_a)
       .def_prop_ro("n_cuts", [](const StitcherPass& self) { return self.stitcher.n_cuts(); })
       .def_prop_ro("n_markers", [](const StitcherPass& self) { return self.stitcher.n_markers(); });
+  nb::enum_<ExchangeEvidence>(module, "ExchangeEvidence")
+      .value("medians", ExchangeEvidence::medians)
+      .value("spreads", ExchangeEvidence::spreads)
+      .value("motion", ExchangeEvidence::motion);
   module.def("exchanged_stretches", &exchanged_stretches, "motion"_a, "times"_a, "kind"_a, "F"_a, "Q"_a,
              "points"_a, "frames"_a, "offsets"_a, "is_examined"_a, nb::kw_only(), "p_detection"_a,
-             "noise"_a, "by_spreads"_a, "by_motion"_a);
+             "noise"_a, "evidence"_a);
   nb::class_<LiveStitcher>(module, "LiveStitcher")
       .def(nb::init<const MotionModel&, const StitchOptions&, std::int64_t>(), "motion"_a,
            "options"_a, nb::kw_only(), "lag"_a)

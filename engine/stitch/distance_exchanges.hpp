@@ -18,12 +18,12 @@ namespace asterism {
 inline std::vector<ExchangedStretch> stretches_of_pairs(const UsualDistances& all,
                                                         const MotionModel& m, const Timeline& line,
                                                         double p_detection, double noise,
-                                                        bool by_spreads, bool by_motion,
+                                                        ExchangeEvidence evidence,
                                                         std::span<const char> is_examined) {
   constexpr double kNear = 0.3;  // usual distance of tracks that are compared, metres
   std::vector<ExchangedStretch> found;
   std::vector<Exchange> exchanges;  // by tracks
-  if (by_motion) {
+  if (evidence == ExchangeEvidence::motion) {
     ExchangeSearch search(m, line, p_detection);
     for (std::int32_t k = 0; k < all.n_tracks(); ++k)
       if (all.is_long(k))
@@ -33,7 +33,7 @@ inline std::vector<ExchangedStretch> stretches_of_pairs(const UsualDistances& al
     exchanges = search.find(1);
     std::ranges::stable_sort(exchanges, {}, &Exchange::track);
   }
-  ExchangedPair pair(all, m, line, p_detection, noise, by_spreads, by_motion);
+  ExchangedPair pair(all, m, line, p_detection, noise, evidence);
   for (std::int32_t a = 0; a < all.n_tracks(); ++a)
     for (std::int32_t b = a + 1; b < all.n_tracks(); ++b)
       if ((is_examined[a] || is_examined[b]) && all.usual(a, b) < kNear) {

@@ -7,6 +7,7 @@ import pytest
 
 import asterism as am
 from asterism import _engine
+from asterism._engine import ExchangeEvidence as By
 from asterism.model.compiled import motion_model, steps_of
 from asterism.tracking.stitching import exchanged as module
 from asterism.tracking.stitching.exchanged import (
@@ -19,10 +20,6 @@ from tests.references.distance_exchanges import stretches
 from tests.scenes import exchanged, sized, steady_and_loose, two_that_circle
 
 NOISE = 1e-3
-
-
-def always(before, after, changed):
-    return True
 
 
 def positions_of(tracks):
@@ -44,14 +41,14 @@ def near_pairs(tracks):
     return np.argwhere(np.triu(np.nanmedian(distance, axis=0) < 0.2, 1))
 
 
-def of_engine(tracks, model, noise=NOISE, *, by_spreads=False, by_motion=False):
+def of_engine(tracks, model, noise=NOISE, evidence=By.medians):
     d, (kind, F, Q) = tracks.detections, steps_of(model.motion, tracks.detections.times)
     order, offsets = tracks.by_track
     found = _engine.exchanged_stretches(
         motion_model(model, d.n_axes), d.times, kind, F, Q, np.ascontiguousarray(d.points[order]),
         d.frame_of[order].astype(np.int64), offsets.astype(np.int64),
         np.ones(tracks.n_tracks, dtype=bool), p_detection=0.9, noise=noise,
-        by_spreads=by_spreads, by_motion=by_motion,
+        evidence=evidence,
     )  # fmt: skip
     return [
         (*pair.tolist(), *stretch.tolist(), gain)
@@ -99,11 +96,9 @@ def exchanges_of(tracks, model):
     return found
 
 
-@pytest.mark.parametrize(
-    ("by_spreads", "by_motion"), [(False, False), (True, False), (False, True)]
-)
+@pytest.mark.parametrize("evidence", By)
 @pytest.mark.parametrize("seed", range(sized(4, 1)))
-def test_stretches_are_those_of_the_reference(seed, by_spreads, by_motion):
+def test_stretches_are_those_of_the_reference(seed, evidence):
     rng = np.random.default_rng(seed)
     person = am.simulate.person(frames=160, seed=seed)
     truth = am.simulate.corrupt(person, missing=0.15, noise=NOISE, seed=seed)
@@ -113,10 +108,10 @@ def test_stretches_are_those_of_the_reference(seed, by_spreads, by_motion):
         first, n = rng.integers(0, 140), rng.integers(5, 60)
         tracks = exchanged(tracks, pair, range(first, first + n))
     model = model_of(tracks.detections)
-    found = of_engine(tracks, model, by_spreads=by_spreads, by_motion=by_motion)
-    exchanges = exchanges_of(tracks, model) if by_motion else None
+    found = of_engine(tracks, model, evidence=evidence)
+    exchanges = exchanges_of(tracks, model) if evidence is By.motion else None
     motion = motion_of(tracks, model)
-    wanted = stretches(positions_of(tracks), NOISE, motion, by_spreads, exchanges)
+    wanted = stretches(positions_of(tracks), NOISE, motion, evidence is not By.medians, exchanges)
     assert [f[:4] for f in found] == [w[:4] for w in wanted]
     assert [f[4] for f in found] == pytest.approx([w[4] for w in wanted], abs=1e-6)
     assert len(found) >= 2
@@ -150,7 +145,7 @@ def test_an_exchange_is_undone_by_the_spreads_of_distances(seed):
     wrong = exchanged(truth, (5, 6), range(105, 305)).labels.astype(np.int64)
     labels, _ = exchanged_back(d, wrong, model)
     assert np.array_equal(labels, wrong)
-    labels, log_odds = exchanged_back(d, wrong, model, by_spreads=True)
+    labels, log_odds = exchanged_back(d, wrong, model, By.spreads)
     assert np.array_equal(labels, truth.labels)
     assert (log_odds[wrong != truth.labels] > 6).all()
 
@@ -160,9 +155,9 @@ def test_an_exchange_of_tracks_with_the_same_distances_is_undone_by_the_motion(s
     truth = two_that_circle(seed)
     d, model = truth.detections, model_of(truth.detections)
     wrong = exchanged(truth, (5, 6), range(150, 260)).labels.astype(np.int64)
-    labels, _ = exchanged_back(d, wrong, model, by_spreads=True)
+    labels, _ = exchanged_back(d, wrong, model, By.spreads)
     assert np.array_equal(labels, wrong)  # not by the distances
-    labels, log_odds = exchanged_back(d, wrong, model, accepts=always)
+    labels, log_odds = exchanged_back(d, wrong, model, By.motion)
     assert np.array_equal(labels, truth.labels)
     assert (log_odds[wrong != truth.labels] > 6).all()
 
@@ -175,7 +170,7 @@ def test_exchanges_that_fit_the_motion_in_several_frames_are_undone():
         d, model = truth.detections, model_of(truth.detections)
         first, n = np.random.default_rng(seed).integers((60, 20), (200, 150))
         wrong = exchanged(truth, (5, 6), range(first, first + n)).labels.astype(np.int64)
-        labels, _ = exchanged_back(d, wrong, model, accepts=always)
+        labels, _ = exchanged_back(d, wrong, model, By.motion)
         n_undone += am.evaluate(am.Tracks(detections=d, labels=labels), truth).idf1 == 1
     assert n_undone == 12
 
@@ -185,7 +180,7 @@ def test_tracks_with_the_same_distances_are_joined_by_the_motion_at_one_edge(str
     truth = two_that_circle(1)
     d, model = truth.detections, model_of(truth.detections)
     wrong = exchanged(truth, (5, 6), stretch).labels.astype(np.int64)
-    labels, _ = exchanged_back(d, wrong, model, accepts=always)
+    labels, _ = exchanged_back(d, wrong, model, By.motion)
     assert am.evaluate(am.Tracks(detections=d, labels=labels), truth).idf1 == 1
 
 
@@ -199,7 +194,7 @@ def test_an_exchange_is_made_if_it_is_accepted():
         return False
 
     labels, log_odds = exchanged_back(
-        truth.detections, wrong, model_of(truth.detections), accepts=accepts
+        truth.detections, wrong, model_of(truth.detections), By.motion, accepts
     )
     assert np.array_equal(labels, wrong)
     assert np.isinf(log_odds).all()
@@ -209,10 +204,10 @@ def test_an_exchange_is_made_if_it_is_accepted():
     assert np.array_equal(changed, np.flatnonzero(wrong != truth.labels))
 
 
-@pytest.mark.parametrize("by_motion", [False, True])
+@pytest.mark.parametrize("evidence", [By.spreads, By.motion])
 @pytest.mark.parametrize("seed", range(sized(4, 1)))
 @pytest.mark.parametrize("n_alone", [0, 150, 270])
-def test_stretches_by_spreads_are_those_of_the_reference(n_alone, seed, by_motion):
+def test_stretches_by_spreads_are_those_of_the_reference(n_alone, seed, evidence):
     """The swinging marker is exchanged, and absent for a part of that stretch."""
     truth = steady_and_loose(seed, until=450)
     d, frame = truth.detections, truth.detections.frame_of
@@ -222,8 +217,8 @@ def test_stretches_by_spreads_are_those_of_the_reference(n_alone, seed, by_motio
     tracks = am.Tracks(detections=d.keep(kept), labels=truth.labels[kept])
     tracks = exchanged(tracks, (5, 6), range(105, 455))
     model = model_of(tracks.detections)
-    found = of_engine(tracks, model, by_spreads=True, by_motion=by_motion)
-    exchanges = exchanges_of(tracks, model) if by_motion else None
+    found = of_engine(tracks, model, evidence=evidence)
+    exchanges = exchanges_of(tracks, model) if evidence is By.motion else None
     motion = motion_of(tracks, model)
     wanted = stretches(positions_of(tracks), NOISE, motion, True, exchanges)
     assert [f[:4] for f in found] == [w[:4] for w in wanted]
@@ -231,16 +226,16 @@ def test_stretches_by_spreads_are_those_of_the_reference(n_alone, seed, by_motio
     assert (len(found) > 0) == (n_alone < 270)  # three quarters alone are too many
 
 
-@pytest.mark.parametrize("options", [{}, {"by_spreads": True}, {"accepts": always}])
+@pytest.mark.parametrize("evidence", By)
 @pytest.mark.parametrize("seed", range(sized(4, 1)))
 @pytest.mark.parametrize("scene", ["person", "smooth", "fingers", "cube"])
-def test_right_tracks_are_left_alone(scene, seed, options):
+def test_right_tracks_are_left_alone(scene, seed, evidence):
     size = {"n_markers": 20} if scene == "smooth" else {}
     made = getattr(am.simulate, scene)(frames=200, seed=seed, **size)
     truth = am.simulate.corrupt(made, missing=0.1, noise=NOISE, seed=seed)
     labels = truth.labels.astype(np.int64)
     model = model_of(truth.detections)
-    again, log_odds = exchanged_back(truth.detections, labels, model, **options)
+    again, log_odds = exchanged_back(truth.detections, labels, model, evidence)
     assert np.array_equal(again, labels)
     assert np.isinf(log_odds).all()
 
@@ -349,7 +344,7 @@ def test_the_engine_refuses_what_does_not_fit(changes):
         "motion": motion_model(model, 3), "times": d.times, "kind": kind, "F": F, "Q": Q,
         "points": np.zeros((4, 3)), "frames": np.array([0, 1, 0, 1]),
         "offsets": np.array([0, 2, 4]), "is_examined": np.ones(2, dtype=bool),
-        "p_detection": 0.9, "noise": 0.001, "by_spreads": False, "by_motion": False,
+        "p_detection": 0.9, "noise": 0.001, "evidence": By.medians,
     }  # fmt: skip
     _engine.exchanged_stretches(**given)
     with pytest.raises(ValueError, match=next(iter(changes))):

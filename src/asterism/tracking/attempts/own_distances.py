@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from asterism._engine import ExchangeEvidence
 from asterism.metrics import oracle_tracks
 from asterism.tracking.attempts.fragments import with_moved_fragments
 from asterism.tracking.attempts.in_gaps import MAX_CELLS, with_detections_in_gaps
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
     from asterism.model import Tracks
     from asterism.tracking.attempts.uncorrected import Uncorrected
+    from asterism.tracking.stitching.exchanged import Accepts
 
 __all__ = [
     "assigned_again",
@@ -216,7 +218,7 @@ def exchanged_by_spreads(found: Uncorrected) -> Uncorrected:
     found : Uncorrected
         Tracks without names.
     """
-    return _exchanged(found, by_spreads=True) if found.is_doubtful else found
+    return _exchanged(found, ExchangeEvidence.spreads) if found.is_doubtful else found
 
 
 def changed_if_more_probable(found: Uncorrected) -> Uncorrected:
@@ -246,17 +248,19 @@ def changed_if_more_probable(found: Uncorrected) -> Uncorrected:
         )
         return with_it > without + EXCHANGE
 
-    exchanged = _exchanged(found, accepts=accepts)
+    exchanged = _exchanged(found, ExchangeEvidence.motion, accepts)
     if exchanged is not found:
         shared = learn_shared_acceleration(exchanged.tracks, model)
     return _changed(exchanged, with_moved_fragments(exchanged.tracks, model, shared))
 
 
-def _exchanged(found: Uncorrected, **options: Any) -> Uncorrected:
+def _exchanged(
+    found: Uncorrected, evidence: ExchangeEvidence, accepts: Accepts | None = None
+) -> Uncorrected:
     tracks = found.tracks
     if found.stitching is None:
         return found
-    labels, _ = exchanged_back(tracks.detections, tracks.labels, found.model, **options)
+    labels, _ = exchanged_back(tracks.detections, tracks.labels, found.model, evidence, accepts)
     return _changed(found, labels)
 
 

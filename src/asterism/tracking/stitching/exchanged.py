@@ -31,8 +31,7 @@ def exchanged_back(
     d: Detections,
     labels: NDArray[np.int64],
     model: TrackingModel,
-    *,
-    by_spreads: bool = False,
+    evidence: _engine.ExchangeEvidence = _engine.ExchangeEvidence.medians,
     accepts: Accepts | None = None,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Exchange tracks back where the distances to others show that they have each other's marker.
@@ -49,14 +48,15 @@ def exchanged_back(
         Track of each detection, -1 for clutter.
     model : TrackingModel
         Model of motion and noise.
-    by_spreads : bool
-        Whether pairs are included whose distances have the same medians and different spreads, as
-        those of an ankle and a toe to the knee. The spreads of a track that is on several markers
-        are large too, so that this is for tracks that are otherwise final.
+    evidence : {medians, spreads, motion} of ExchangeEvidence
+        Pairs that are compared: those with different medians of distances; with `spreads` also
+        those with the same medians and different spreads, as an ankle and a toe have to the knee;
+        with `motion` all, where the motion at both ends of a stretch can tell it. The spreads of a
+        track that is on several markers are large too, so that the last two are for tracks that
+        are otherwise final.
     accepts : callable, optional
         Called with the labels before and after an exchange and with the exchanged detections;
-        returns whether it is made. With it, pairs by spreads are included, and stretches that are
-        found by the motion at their edges where the distances hardly differ.
+        returns whether it is made. By default all are.
 
     Returns
     -------
@@ -78,7 +78,7 @@ def exchanged_back(
             motion, d.times, kind, F, Q, np.ascontiguousarray(d.points[order]),
             d.frame_of[order].astype(np.int64), offsets, is_examined,
             p_detection=min(model.sensor.p_detection, 0.999), noise=model.sensor.noise_sigma,
-            by_spreads=by_spreads, by_motion=accepts is not None,
+            evidence=evidence,
         )  # fmt: skip
         is_examined = np.zeros(n_tracks, dtype=bool)
         for i in np.argsort(-gains, kind="stable"):
