@@ -27,8 +27,8 @@ def log_posterior(
 ) -> float:
     """Return the log posterior of tracks, where track k is of marker k.
 
-    Tracks are cut at the gaps and speeds that the model excludes. The score of one that it excludes
-    otherwise is left out.
+    Tracks are cut at the gaps and speeds that the model excludes. A piece that it excludes for
+    another reason, such as one of a single detection, counts nothing.
 
     Parameters
     ----------
