@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import heapq
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +11,8 @@ from asterism.tracking.attempts.absent_markers import AbsentMarkers
 from asterism.tracking.attempts.posterior import within_limits
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from asterism.model import SharedAcceleration, TrackingModel, Tracks
@@ -24,7 +26,10 @@ ENOUGH = 15.0
 
 
 def with_moved_fragments(
-    tracks: Tracks, model: TrackingModel, shared: SharedAcceleration
+    tracks: Tracks,
+    model: TrackingModel,
+    shared: SharedAcceleration,
+    progress: Callable[[int], Any] | None = None,
 ) -> NDArray[np.int64]:
     """Move fragments of tracks to markers that are absent meanwhile, where that is more probable.
 
@@ -41,6 +46,8 @@ def with_moved_fragments(
         Model of the markers' own motion.
     shared : SharedAcceleration
         Shared accelerations, learnt from the tracks.
+    progress : callable, optional
+        Called with the number of finished frames of the capture.
 
     Returns
     -------
@@ -49,8 +56,11 @@ def with_moved_fragments(
     """
     fragments = _fragments(tracks, model)
     markers = AbsentMarkers(tracks, tracks.labels, model, shared)
-    queue = [(-markers.best(fragment)[0], n) for n, fragment in enumerate(fragments)]
-    heapq.heapify(queue)
+    queue: list[tuple[float, int]] = []
+    for n, fragment in enumerate(fragments):
+        heapq.heappush(queue, (-markers.best(fragment)[0], n))
+        if progress is not None:
+            progress(n * tracks.detections.n_frames // len(fragments))
     while queue and -queue[0][0] > ENOUGH:
         _, n = heapq.heappop(queue)
         label = markers.labels[fragments[n]]

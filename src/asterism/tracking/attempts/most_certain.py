@@ -115,7 +115,7 @@ def most_certain(
             best = _more_certain(best, assigned_again(bodies), 0)
     else:
         best = assigned_again(refined_by_own_distances(first))
-    best = changed_if_more_probable(_after_searches(best, parts.next))
+    best = changed_if_more_probable(_after_searches(best, parts.next), parts.next())
     if best.is_doubtful and is_first and not recipe.common_motion:
         still = _attempt_without_common_motion(recipe, detections, parts.next())
         if still is not None:

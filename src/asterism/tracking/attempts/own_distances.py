@@ -221,7 +221,9 @@ def exchanged_by_spreads(found: Uncorrected) -> Uncorrected:
     return _exchanged(found, ExchangeEvidence.spreads) if found.is_doubtful else found
 
 
-def changed_if_more_probable(found: Uncorrected) -> Uncorrected:
+def changed_if_more_probable(
+    found: Uncorrected, progress: Callable[[int], Any] | None = None
+) -> Uncorrected:
     """Exchange tracks back and move fragments by the log posterior, if identities are in doubt.
 
     The motion at the edges of an exchange must favour it together with the distances, and the log
@@ -233,6 +235,8 @@ def changed_if_more_probable(found: Uncorrected) -> Uncorrected:
     ----------
     found : Uncorrected
         Tracks without names.
+    progress : callable, optional
+        Called with the number of finished frames of the capture.
     """
     if not found.is_doubtful or not has_own_distances(found):
         return found
@@ -251,7 +255,7 @@ def changed_if_more_probable(found: Uncorrected) -> Uncorrected:
     exchanged = _exchanged(found, ExchangeEvidence.motion, accepts)
     if exchanged is not found:
         shared = learn_shared_acceleration(exchanged.tracks, model)
-    return _changed(exchanged, with_moved_fragments(exchanged.tracks, model, shared))
+    return _changed(exchanged, with_moved_fragments(exchanged.tracks, model, shared, progress))
 
 
 def _exchanged(
