@@ -3,7 +3,7 @@
 //
 // The search begins with the frames that the distances separate, or without an exchange. The
 // stretches are those of the most probable sequence of states, by the evidence of the distances in
-// each frame, which are learnt once more from these states. An edge is moved to where the exchange
+// each frame, which are learnt once more from these states, and of the motion at each change. An edge is moved to where the exchange
 // fits the motion best, and the log-likelihood ratio of the motion there counts as well.
 #pragma once
 
@@ -20,11 +20,11 @@
 
 namespace asterism {
 
-// What shows that two tracks are exchanged, beside what is named before it.
+// Evidence of an exchange. Each value includes those above it.
 enum class ExchangeEvidence {
-  medians,  // of at least two distances
-  spreads,  // of distances with the same medians
-  motion,   // at both ends, where at most one distance differs
+  medians,  // of the distances, if at least two differ
+  spreads,  // of the distances, if two differ in their medians or spreads
+  motion,   // where the state changes, whatever differs
 };
 
 struct ExchangedStretch {

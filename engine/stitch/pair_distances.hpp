@@ -1,4 +1,4 @@
-// The distances of two tracks to others, by which one is told from the other.
+// The distances of two tracks to others, by which the two are distinguished.
 //
 // Where two tracks are exchanged, their distances to a third one are exchanged too. If the medians of
 // enough distances differ, the difference of the distances changes its sign there, so that the frames

@@ -67,6 +67,34 @@ def test_tracks_in_doubt_are_exchanged_back_where_that_is_more_probable(
         np.testing.assert_array_equal(after.tracks.labels, right.tracks.labels)
 
 
+def test_tracklets_in_doubt_move_to_the_absent_marker(monkeypatch):
+    monkeypatch.setattr("asterism.tracking.attempts.uncorrected.DOUBTFUL", -1.0)
+    person = am.simulate.corrupt(
+        am.simulate.person(activity="run", frames=300, seed=2), noise=3e-4, stride=2, seed=2
+    )
+    recipe = plan_tracking(person.detections).recipe
+    model = am.tracking.tracklet_model(recipe.model)
+    right, frame = person.labels.copy(), person.detections.frame_of
+    gap = model.population.max_gap + 2
+    near = (frame >= 60 - gap) & (frame < 80 + gap)
+    right[((right == 36) & near & ((frame < 60) | (frame >= 80))) | ((right == 37) & near)] = -1
+    inside = (right == 36) & near
+    found = am.stitch(am.Tracks(detections=person.detections, labels=right), model)
+    labels = found.tracks.labels
+    one, other = (int(labels[right == k][0]) for k in (36, 37))
+    assert (labels[right == 36] == one).all()
+    wrong = np.where(inside, other, labels)
+    stitching = with_markers(found, wrong, np.full(len(wrong), 0.95))
+    tracks = dataclasses.replace(found.tracks, labels=wrong)
+    for each in (stitching, None):
+        before = Uncorrected(tracks=tracks, recipe=recipe, model=model, stitching=each)
+        after = own_distances.changed_if_more_probable(before)
+        np.testing.assert_array_equal(after.tracks.labels, labels)
+        if each is not None:
+            assert after.stitching.tracks is after.tracks
+            assert after.tracks.info["joins"] == len(after.stitching.joins)
+
+
 def test_tracks_are_cut_at_gaps_that_the_model_excludes_and_keep_their_labels():
     person, found = followed_through_a_gap()
     again = own_distances._stitched_again(found)

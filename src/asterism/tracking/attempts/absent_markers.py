@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
 __all__ = ["AbsentMarkers"]
 
-FARTHEST = 3.5
+MAX_DEVIATION = 3.5
 """Largest mean squared deviation, in variances, of the distances that detections have to the
 neighbours of a marker if they may be of this marker."""
-BOUND = 4.0
+MAX_TERM = 4.0
 """Largest squared deviation of one distance. Distances to a wrong marker have hardly less."""
-COMPARED = 10
+N_COMPARED = 10
 """Number of detections whose distances are compared."""
 
 
@@ -76,18 +76,16 @@ class AbsentMarkers:
         """
         frames = self._tracks.detections.frame_of[detections]
         is_absent = np.isnan(self._positions[frames, :, 0]).all(axis=0)
-        found, marker = -np.inf, -1
-        for k in np.flatnonzero(is_absent).tolist():
-            if self._deviation(k, detections) > FARTHEST:
-                continue
-            labels = self.labels.copy()
-            labels[detections] = k
-            log_posterior = self._log_posterior(detections, labels)
-            if log_posterior > found:
-                found, marker = log_posterior, k
-        if marker < 0:
-            return found, marker
-        return found - self._log_posterior(detections, self.labels), marker
+        candidates = [
+            k for k in np.flatnonzero(is_absent).tolist()
+            if self._deviation(k, detections) <= MAX_DEVIATION
+        ]  # fmt: skip
+        if not candidates:
+            return -np.inf, -1
+        found = [self._log_posterior(detections, k) for k in candidates]
+        best = int(np.argmax(found))
+        now = self._log_posterior(detections, int(self.labels[detections[0]]))
+        return found[best] - now, candidates[best]
 
     def move(self, detections: NDArray[np.int64], marker: int) -> None:
         """Give detections with the same label to a marker that is absent in their frames.
@@ -108,13 +106,16 @@ class AbsentMarkers:
 
     def _deviation(self, marker: int, detections: NDArray[np.int64]) -> float:
         """Return the mean squared deviation of distances; infinity if none is known."""
-        some = detections[np.linspace(0, len(detections) - 1, COMPARED).astype(int)]
+        some = detections[np.linspace(0, len(detections) - 1, N_COMPARED).astype(int)]
         bonds, d = self._bonds[marker], self._tracks.detections
+        bonds = bonds[self._other[bonds] != self.labels[detections[0]]]  # itself
         others = self._positions[d.frame_of[some]][:, self._other[bonds]]
         apart = np.linalg.norm(others - d.points[some, None], axis=2)
         squares = (apart - self._distance[bonds]) ** 2 / self._variance[bonds]
         known = squares[np.isfinite(squares)]
-        return float(np.minimum(known, BOUND).mean()) if len(known) else np.inf
+        return float(np.minimum(known, MAX_TERM).mean()) if len(known) else np.inf
 
-    def _log_posterior(self, detections: NDArray[np.int64], labels: NDArray[np.int64]) -> float:
+    def _log_posterior(self, detections: NDArray[np.int64], marker: int) -> float:
+        labels = self.labels.copy()
+        labels[detections] = marker
         return log_posterior_around(detections, self._tracks, labels, self._model, self._shared)

@@ -9,9 +9,9 @@ import numpy as np
 
 from asterism._engine import ExchangeEvidence
 from asterism.metrics import oracle_tracks
-from asterism.tracking.attempts.fragments import with_moved_fragments
 from asterism.tracking.attempts.in_gaps import MAX_CELLS, with_detections_in_gaps
 from asterism.tracking.attempts.lost import with_lost_markers
+from asterism.tracking.attempts.moved_tracklets import with_moved_tracklets
 from asterism.tracking.attempts.posterior import log_posterior_around
 from asterism.tracking.attempts.shared_search import searched_with_shared_accelerations
 from asterism.tracking.confidence.identity import OTHER_JOIN
@@ -224,11 +224,11 @@ def exchanged_by_spreads(found: Uncorrected) -> Uncorrected:
 def changed_if_more_probable(
     found: Uncorrected, progress: Callable[[int], Any] | None = None
 ) -> Uncorrected:
-    """Exchange tracks back and move fragments by the log posterior, if identities are in doubt.
+    """Exchange tracks back and move tracklets by the log posterior, if identities are in doubt.
 
     The motion at the edges of an exchange must favour it together with the distances, and the log
-    posterior with shared accelerations must rise by `EXCHANGE`. Then fragments move to the markers
-    that they are of (`with_moved_fragments`). This is for tracks that no attempt follows: the
+    posterior with shared accelerations must rise by `EXCHANGE`. Then tracklets of other markers
+    leave their tracks (`with_moved_tracklets`). This is for tracks that no attempt follows: the
     confidence hardly sees such an exchange, so that it could not compare them.
 
     Parameters
@@ -255,7 +255,7 @@ def changed_if_more_probable(
     exchanged = _exchanged(found, ExchangeEvidence.motion, accepts)
     if exchanged is not found:
         shared = learn_shared_acceleration(exchanged.tracks, model)
-    return _changed(exchanged, with_moved_fragments(exchanged.tracks, model, shared, progress))
+    return _changed(exchanged, with_moved_tracklets(exchanged.tracks, model, shared, progress))
 
 
 def _exchanged(

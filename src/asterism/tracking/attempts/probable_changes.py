@@ -33,7 +33,8 @@ def probable_changes(
     A tracklet of the search is of the marker whose label is the first that its detections were
     given. A change by which tracks only lose detections is not taken over: jolts are less probable
     by the model than they are. A tracklet without a given label is of the marker with bonds, absent
-    in its frames, with which the tracks are most probable. It is clutter if they are more probable
+    in its frames, with which the tracks are most probable, among those whose distances it keeps. It
+    is clutter if they are more probable
     with it as clutter, or as a track of no marker.
 
     Parameters

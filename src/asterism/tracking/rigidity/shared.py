@@ -93,7 +93,7 @@ def learn_shared_acceleration(tracks: Tracks, model: TrackingModel) -> SharedAcc
     densities, _ = shared_densities(tracks, model, shared)
     weights = fitted_weights(densities, tracks.labels, K)
     is_led = (weights[:, :N_OWN].sum(axis=1) < 0.5) & (np.diff(offsets) > 0)
-    steadiest = np.array(offsets[:-1])[is_led]
+    steadiest = np.array(offsets[:-1], dtype=np.int64)[is_led]
     size, size_std = shared_size(tracks, marker[steadiest], others[steadiest])
     return dataclasses.replace(shared, weights=weights, size=size, size_std=size_std)
 

@@ -49,11 +49,11 @@ def exchanged_back(
     model : TrackingModel
         Model of motion and noise.
     evidence : {medians, spreads, motion} of ExchangeEvidence
-        Pairs that are compared: those with different medians of distances; with `spreads` also
-        those with the same medians and different spreads, as an ankle and a toe have to the knee;
-        with `motion` all, where the motion at both ends of a stretch can tell it. The spreads of a
-        track that is on several markers are large too, so that the last two are for tracks that
-        are otherwise final.
+        Of pairs with different medians of distances. With `spreads` also of pairs with the same
+        medians and different spreads, as an ankle and a toe have to the knee. With `motion` also of
+        pairs with the same distances: the log-likelihood ratio of the motion at each change of
+        state counts. The spreads of a track that is on several markers are large too, so that the
+        last two are for tracks that are otherwise final.
     accepts : callable, optional
         Called with the labels before and after an exchange and with the exchanged detections;
         returns whether it is made. By default all are.

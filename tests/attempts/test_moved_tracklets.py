@@ -1,4 +1,4 @@
-"""Fragments of tracks moved to absent markers, against the truth and against all markers."""
+"""Tracklets of tracks moved to absent markers, against the truth and against all markers."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import asterism as am
-from asterism.tracking.attempts import absent_markers, fragments
+from asterism.tracking.attempts import absent_markers, moved_tracklets
 from asterism.tracking.attempts.absent_markers import AbsentMarkers
-from asterism.tracking.attempts.fragments import with_moved_fragments
+from asterism.tracking.attempts.moved_tracklets import with_moved_tracklets
 from asterism.tracking.attempts.posterior import log_posterior
 
 CAPTURE = am.simulate.corrupt(
@@ -36,18 +36,18 @@ def occluded(*hidden):
 
 
 def moved(labels, model=MODEL):
-    return with_moved_fragments(am.Tracks(detections=D, labels=labels), model, SHARED)
+    return with_moved_tracklets(am.Tracks(detections=D, labels=labels), model, SHARED)
 
 
 def alone(begin, end):
-    """ONE, with a fragment between long gaps, and OTHER, which is absent in all of that."""
+    """ONE, with a tracklet between long gaps, and OTHER, which is absent in all of that."""
     return occluded(
         (ONE, begin - GAP, begin), (ONE, end, end + GAP), (OTHER, begin - GAP, end + GAP)
     )
 
 
 @pytest.mark.parametrize(("begin", "end"), [(60, 64), (60, 80), (40, 100)])
-def test_a_fragment_with_another_label_moves_to_its_marker_and_stays_there(begin, end):
+def test_a_tracklet_with_another_label_moves_to_its_marker_and_stays_there(begin, end):
     right = alone(begin, end)
     wrong = right.copy()
     wrong[at(right, ONE, begin, end)] = OTHER
@@ -58,7 +58,7 @@ def test_a_fragment_with_another_label_moves_to_its_marker_and_stays_there(begin
 @pytest.mark.parametrize("is_beginning", [True, False])
 def test_the_beginning_or_the_end_of_a_piece_moves_to_its_marker(is_beginning):
     begin, end, far = 60, 65, 65 + GAP
-    if is_beginning:  # OTHER is seen again one frame after the fragment of ONE
+    if is_beginning:  # OTHER is seen again one frame after the tracklet of ONE
         hidden = [(ONE, begin - GAP, begin), (ONE, end, far)]
         hidden += [(OTHER, begin - GAP, end + 1), (OTHER, end + 8, end + 9)]
     else:  # OTHER is last seen two frames before it
@@ -79,20 +79,20 @@ def test_the_most_probable_move_is_made_first_and_changes_the_others(monkeypatch
         def __init__(self, _, labels, *others):
             self.labels = labels
 
-        def best(self, fragment):
-            n = int(fragment[0])
+        def best(self, tracklet):
+            n = int(tracklet[0])
             return (after if moves else before)[n], n
 
         def move(self, _, marker):
             moves.append(marker)
 
-    monkeypatch.setattr(fragments, "AbsentMarkers", Markers)
-    monkeypatch.setattr(fragments, "_fragments", lambda *_: [np.array([n]) for n in range(6)])
+    monkeypatch.setattr(moved_tracklets, "AbsentMarkers", Markers)
+    monkeypatch.setattr(moved_tracklets, "_tracklets", lambda *_: [np.array([n]) for n in range(6)])
     moved(CAPTURE.labels)
     assert moves == [2, 0, 4]
 
 
-def test_many_wrong_fragments_are_mended_and_no_right_one_is_lost():
+def test_many_wrong_tracklets_are_mended_and_no_right_one_is_lost():
     rng, labels = np.random.default_rng(3), CAPTURE.labels.copy()
     wrong, n = labels.copy(), 0
     for begin in range(GAP + 1, D.n_frames - 3 * GAP, 3 * GAP):
@@ -112,28 +112,32 @@ def test_many_wrong_fragments_are_mended_and_no_right_one_is_lost():
     assert (found == labels)[wrong == labels].all()
 
 
-def test_only_short_fragments_move_and_only_by_enough(monkeypatch):
+def test_only_short_tracklets_move_and_only_by_enough(monkeypatch):
     right = alone(60, 80)
     wrong = right.copy()
     wrong[at(right, ONE, 60, 80)] = OTHER
-    monkeypatch.setattr(fragments, "LONGEST", 19)
+    monkeypatch.setattr(moved_tracklets, "MAX_LENGTH", 19)
     np.testing.assert_array_equal(moved(wrong), wrong)
-    monkeypatch.setattr(fragments, "LONGEST", 200)
-    monkeypatch.setattr(fragments, "ENOUGH", 1e6)
-    np.testing.assert_array_equal(moved(wrong), wrong)
+    monkeypatch.setattr(moved_tracklets, "MAX_LENGTH", 20)
+    tracks = am.Tracks(detections=D, labels=wrong)
+    tracklet = np.flatnonzero(at(right, ONE, 60, 80))
+    log_odds, _ = AbsentMarkers(tracks, wrong, MODEL, SHARED).best(tracklet)
+    for least, after in ((log_odds + 1e-6, wrong), (log_odds - 1e-6, right)):
+        monkeypatch.setattr(moved_tracklets, "MIN_LOG_ODDS", least)
+        np.testing.assert_array_equal(moved(wrong), after)
 
 
 def test_the_best_marker_is_the_most_probable_of_all_that_are_absent(monkeypatch):
-    monkeypatch.setattr(absent_markers, "FARTHEST", np.inf)
+    monkeypatch.setattr(absent_markers, "MAX_DEVIATION", np.inf)
     others = range(OTHER, OTHER + 6)
     labels = occluded(*[(k, 50, 80) for k in others])
     tracks = am.Tracks(detections=D, labels=labels)
-    fragment = np.flatnonzero(at(CAPTURE.labels, OTHER + 2, 60, 64))
-    log_odds, marker = AbsentMarkers(tracks, labels, MODEL, SHARED).best(fragment)
+    tracklet = np.flatnonzero(at(CAPTURE.labels, OTHER + 2, 60, 64))
+    log_odds, marker = AbsentMarkers(tracks, labels, MODEL, SHARED).best(tracklet)
 
     def whole(k):
         changed = labels.copy()
-        changed[fragment] = k
+        changed[tracklet] = k
         return log_posterior(am.Tracks(detections=D, labels=changed), MODEL, SHARED)
 
     each = {k: whole(k) - whole(-1) for k in others}
@@ -153,12 +157,23 @@ def test_detections_are_of_a_marker_only_where_its_distances_lead(marker):
     assert markers.best(far) == (-np.inf, -1)
 
 
+def test_distances_are_those_of_the_whole_tracklet():
+    labels = occluded((ONE, 50, 80))
+    tracks = am.Tracks(detections=D, labels=labels)
+    own = np.flatnonzero(at(CAPTURE.labels, ONE, 59, 60))
+    longer = np.flatnonzero(at(CAPTURE.labels, 20, 60, 80))
+    labels[longer] = -1
+    markers = AbsentMarkers(tracks, labels, MODEL, SHARED)
+    assert markers.best(own)[1] == ONE
+    assert markers.best(np.append(own, longer))[1] != ONE
+
+
 def test_a_move_makes_the_marker_present_and_the_old_one_absent():
     labels = alone(60, 64)
-    fragment, third = (np.flatnonzero(at(labels, k, 60, 64)) for k in (ONE, OTHER + 1))
+    tracklet, third = (np.flatnonzero(at(labels, k, 60, 64)) for k in (ONE, OTHER + 1))
     markers = AbsentMarkers(am.Tracks(detections=D, labels=labels), labels, MODEL, SHARED)
-    assert [markers.best(each)[1] for each in (fragment, third)] == [OTHER, OTHER]
-    markers.move(fragment, OTHER)
-    assert (markers.labels[fragment] == OTHER).all()
-    assert [markers.best(each)[1] for each in (fragment, third)] == [ONE, ONE]
-    assert (labels[fragment] == ONE).all()
+    assert [markers.best(each)[1] for each in (tracklet, third)] == [OTHER, OTHER]
+    markers.move(tracklet, OTHER)
+    assert (markers.labels[tracklet] == OTHER).all()
+    assert [markers.best(each)[1] for each in (tracklet, third)] == [ONE, ONE]
+    assert (labels[tracklet] == ONE).all()
