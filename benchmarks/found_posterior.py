@@ -77,7 +77,7 @@ def first_labels(tracks: am.Tracks, given: NDArray[Any]) -> NDArray[Any]:
 
 
 def labels_of(tracks: am.Tracks, found: am.Tracks) -> NDArray[Any]:
-    """Return the labels of tracks, each that of the found track it has most detections of."""
+    """Return the labels of found tracks for others, at most one each, with most in common."""
     both = (tracks.labels >= 0) & (found.labels >= 0)
     shared = np.zeros((tracks.n_tracks, found.n_tracks))
     np.add.at(shared, (tracks.labels[both], found.labels[both]), 1)
@@ -124,9 +124,13 @@ def main() -> None:
             for tracks in (alone, together):
                 markers = first_labels(tracks, found.labels)
                 row += summary(log_posteriors(tracks, model, shared, markers) - of_truth)
-            others = [am.track(d, other, model=found.recipe.model) for other in OTHERS]
+            others = [
+                am.track(d, other, model=found.recipe.model, stitch=found.recipe.stitch)
+                for other in OTHERS
+            ]
             of_others = [
-                log_posteriors(each, model, shared, labels_of(each, found)) for each in others
+                log_posteriors(each, model, shared, first_labels(each, found.labels))
+                for each in others
             ]
             row += summary(of_found - np.max(of_others, axis=0))
             rows.append(row)

@@ -142,6 +142,15 @@ def test_markers_of_a_segment_are_learnt_to_move_together_and_others_not():
     assert of_segment.mean() > 3
 
 
+def test_of_clutter_nothing_is_learnt():
+    truth = am.simulate.cube(frames=30, seed=1)
+    clutter = am.Tracks(detections=truth.detections, labels=np.full(len(truth.labels), -1))
+    model = am.estimate_model(truth.detections).model
+    shared = am.tracking.learn_shared_acceleration(clutter, model)
+    assert shared.weights.shape == (0, len(COMPONENTS))
+    assert not am.model.shared_gains(clutter, model, shared).any()
+
+
 def test_weights_are_those_from_which_detections_were_drawn():
     """Field accelerations with known shares: each is learnt within three standard errors."""
     rng = np.random.default_rng(5)
