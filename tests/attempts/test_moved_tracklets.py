@@ -92,6 +92,37 @@ def test_the_most_probable_move_is_made_first_and_changes_the_others(monkeypatch
     assert moves == [2, 0, 4]
 
 
+def test_a_tracklet_of_which_a_part_has_moved_stays(monkeypatch):
+    first = np.flatnonzero(at(CAPTURE.labels, ONE, 0, 9))
+    moves = []
+
+    class Markers(AbsentMarkers):
+        def best(self, detections):
+            return 90.0 - len(detections), OTHER
+
+        def move(self, detections, marker):
+            moves.append(len(detections))
+            self.labels[detections] = marker
+
+    monkeypatch.setattr(moved_tracklets, "AbsentMarkers", Markers)
+    monkeypatch.setattr(moved_tracklets, "_tracklets", lambda *_: [first, first[:4]])
+    moved(CAPTURE.labels)
+    assert moves == [4]
+
+
+def test_a_tracklet_is_not_its_own_neighbour():
+    labels, tracklet = alone(60, 64), np.flatnonzero(at(alone(60, 64), ONE, 60, 64))
+    clutter, other = labels.copy(), labels.copy()
+    clutter[tracklet], other[tracklet] = -1, OTHER
+    deviations = [
+        AbsentMarkers(
+            am.Tracks(detections=D, labels=each), each, MODEL, SHARED
+        )._deviation(ONE, tracklet)
+        for each in (clutter, other)
+    ]  # fmt: skip
+    assert deviations[0] == deviations[1]
+
+
 def test_many_wrong_tracklets_are_mended_and_no_right_one_is_lost():
     rng, labels = np.random.default_rng(3), CAPTURE.labels.copy()
     wrong, n = labels.copy(), 0
