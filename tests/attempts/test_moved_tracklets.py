@@ -111,9 +111,10 @@ def test_a_tracklet_of_which_a_part_has_moved_stays(monkeypatch):
 
 
 def test_a_tracklet_is_not_its_own_neighbour():
-    labels, tracklet = alone(60, 64), np.flatnonzero(at(alone(60, 64), ONE, 60, 64))
-    clutter, other = labels.copy(), labels.copy()
-    clutter[tracklet], other[tracklet] = -1, OTHER
+    neighbour = int(SHARED.others[SHARED.offsets[ONE]])
+    clutter = occluded((ONE, 50, 80), (neighbour, 50, 80))
+    other, tracklet = clutter.copy(), np.flatnonzero(at(CAPTURE.labels, ONE, 60, 64))
+    other[tracklet] = neighbour
     deviations = [
         AbsentMarkers(
             am.Tracks(detections=D, labels=each), each, MODEL, SHARED
