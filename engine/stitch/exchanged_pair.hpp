@@ -3,8 +3,9 @@
 //
 // The search begins with the frames that the distances separate, or without an exchange. The
 // stretches are those of the most probable sequence of states, by the evidence of the distances in
-// each frame, which are learnt once more from these states, and of the motion at each change. An edge is moved to where the exchange
-// fits the motion best, and the log-likelihood ratio of the motion there counts as well.
+// each frame and of the motion at each change; the distances are learnt once more from these states.
+// An edge is moved to where the exchange fits the motion best, and the log-likelihood ratio of the
+// motion there counts as well.
 #pragma once
 
 #include <algorithm>
