@@ -1,4 +1,4 @@
-"""Which of the markers that are absent meanwhile is that of some detections."""
+"""The most probable marker of some detections, among those that are absent in their frames."""
 
 from __future__ import annotations
 
@@ -116,6 +116,10 @@ class AbsentMarkers:
         return float(np.minimum(known, MAX_TERM).mean()) if len(known) else np.inf
 
     def _log_posterior(self, detections: NDArray[np.int64], marker: int) -> float:
-        labels = self.labels.copy()
-        labels[detections] = marker
-        return log_posterior_around(detections, self._tracks, labels, self._model, self._shared)
+        own = self.labels[detections]
+        self.labels[detections] = marker
+        log_posterior = log_posterior_around(
+            detections, self._tracks, self.labels, self._model, self._shared
+        )
+        self.labels[detections] = own
+        return log_posterior

@@ -1,4 +1,4 @@
-"""Tracklets of one marker in the track of another, moved to the marker that is absent meanwhile."""
+"""Tracklets of other markers in a track, moved to the markers that are absent meanwhile."""
 
 from __future__ import annotations
 
