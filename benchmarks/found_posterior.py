@@ -5,8 +5,8 @@ and at half the rate. `track` without a method tracks each as a whole; so do oth
 same model and stitching, and MCMCDA searches from the default. Tracks and truth are cut into pieces
 of 100 frames, and at the gaps and speeds that the model excludes; the posterior is that of the
 model by which the tracks were made, alone and with the shared accelerations that are learnt from
-the found tracks, with which MCMCDA searches over the whole capture. A track that the model excludes
-otherwise counts as clutter.
+the found tracks, with which MCMCDA searches over the whole capture. A track of a single detection
+adds nothing.
 
     python benchmarks/found_posterior.py [--data FOLDER] [--only NAME] [--markdown FILE]
 """
@@ -77,7 +77,7 @@ def first_labels(tracks: am.Tracks, given: NDArray[Any]) -> NDArray[Any]:
 
 
 def labels_of(tracks: am.Tracks, found: am.Tracks) -> NDArray[Any]:
-    """Return the labels of found tracks for others, at most one each, with most in common."""
+    """Return the found track of each detection's track, one to one, with most in common."""
     both = (tracks.labels >= 0) & (found.labels >= 0)
     shared = np.zeros((tracks.n_tracks, found.n_tracks))
     np.add.at(shared, (tracks.labels[both], found.labels[both]), 1)

@@ -92,22 +92,13 @@ def test_the_most_probable_move_is_made_first_and_changes_the_others(monkeypatch
     assert moves == [2, 0, 4]
 
 
-def test_a_tracklet_of_which_a_part_has_moved_stays(monkeypatch):
-    first = np.flatnonzero(at(CAPTURE.labels, ONE, 0, 9))
-    moves = []
-
-    class Markers(AbsentMarkers):
-        def best(self, detections):
-            return 90.0 - len(detections), OTHER
-
-        def move(self, detections, marker):
-            moves.append(len(detections))
-            self.labels[detections] = marker
-
-    monkeypatch.setattr(moved_tracklets, "AbsentMarkers", Markers)
-    monkeypatch.setattr(moved_tracklets, "_tracklets", lambda *_: [first, first[:4]])
-    moved(CAPTURE.labels)
-    assert moves == [4]
+def test_a_tracklet_of_which_a_part_has_moved_stays():
+    labels = alone(60, 64)
+    tracklet = np.flatnonzero(at(labels, ONE, 60, 64))
+    markers = AbsentMarkers(am.Tracks(detections=D, labels=labels), labels, MODEL, SHARED)
+    assert markers.best(tracklet)[1] == OTHER
+    markers.move(tracklet[:2], OTHER)
+    assert markers.best(tracklet) == (-np.inf, -1)
 
 
 def test_a_tracklet_is_not_its_own_neighbour():

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 __all__ = ["AbsentMarkers"]
 
 MAX_DEVIATION = 3.5
-"""Largest mean squared deviation, in variances, of the distances that detections have to the
-neighbours of a marker if they may be of this marker."""
+"""Largest mean squared error, in variances, of the distances to the neighbours of a marker, with
+which detections may be of this marker."""
 MAX_TERM = 4.0
-"""Largest squared deviation of one distance. Distances to a wrong marker have hardly less."""
+"""Largest squared error of one distance that counts. Most distances of a wrong marker reach it."""
 N_COMPARED = 10
 """Number of detections whose distances are compared."""
 
@@ -67,13 +67,17 @@ class AbsentMarkers:
         """Return the log odds of the most probable marker, and the marker.
 
         They are the log posterior with the detections as this marker less that with their present
-        label; minus infinity if they can be of none.
+        label. They are minus infinity, and the marker is -1, if no marker is possible or the labels
+        differ.
 
         Parameters
         ----------
         detections : ndarray of int, shape (n,)
-            Detections with the same label, in time order.
+            Detections in time order.
         """
+        own = self.labels[detections]
+        if (own != own[0]).any():
+            return -np.inf, -1
         frames = self._tracks.detections.frame_of[detections]
         is_absent = np.isnan(self._positions[frames, :, 0]).all(axis=0)
         candidates = [
@@ -84,7 +88,7 @@ class AbsentMarkers:
             return -np.inf, -1
         found = [self._log_posterior(detections, k) for k in candidates]
         best = int(np.argmax(found))
-        now = self._log_posterior(detections, int(self.labels[detections[0]]))
+        now = self._log_posterior(detections, int(own[0]))
         return found[best] - now, candidates[best]
 
     def move(self, detections: NDArray[np.int64], marker: int) -> None:
@@ -105,7 +109,7 @@ class AbsentMarkers:
         self.labels[detections] = marker
 
     def _deviation(self, marker: int, detections: NDArray[np.int64]) -> float:
-        """Return the mean squared deviation of distances; infinity if none is known."""
+        """Return the mean squared error of distances, in variances; infinity if none is known."""
         some = detections[np.linspace(0, len(detections) - 1, N_COMPARED).astype(int)]
         bonds, d = self._bonds[marker], self._tracks.detections
         bonds = bonds[self._other[bonds] != self.labels[detections[0]]]  # itself

@@ -56,22 +56,14 @@ def with_moved_tracklets(
     """
     n_frames, tracklets = tracks.detections.n_frames, _tracklets(tracks, model)
     markers = AbsentMarkers(tracks, tracks.labels, model, shared)
-
-    def best(n: int) -> tuple[float, int]:
-        """Return the log odds of the most probable move of a tracklet, and the marker."""
-        labels = markers.labels[tracklets[n]]
-        if (labels != labels[0]).any():  # a part of it has moved
-            return -np.inf, -1
-        return markers.best(tracklets[n])
-
     queue: list[tuple[float, int]] = []
-    for n in range(len(tracklets)):
-        heapq.heappush(queue, (-best(n)[0], n))
+    for n, tracklet in enumerate(tracklets):
+        heapq.heappush(queue, (-markers.best(tracklet)[0], n))
         if progress is not None:
             progress((n + 1) * n_frames // len(tracklets))
     while queue and -queue[0][0] > MIN_LOG_ODDS:
         _, n = heapq.heappop(queue)
-        log_odds, marker = best(n)
+        log_odds, marker = markers.best(tracklets[n])
         if queue and log_odds < -queue[0][0]:
             heapq.heappush(queue, (-log_odds, n))
         elif log_odds > MIN_LOG_ODDS:

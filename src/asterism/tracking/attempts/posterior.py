@@ -28,7 +28,7 @@ def log_posterior(
     """Return the log posterior of tracks, where track k is of marker k.
 
     Tracks are cut at the gaps and speeds that the model excludes. A piece that it excludes for
-    another reason, such as one of a single detection, counts nothing.
+    another reason, such as one of a single detection, adds nothing.
 
     Parameters
     ----------

@@ -34,8 +34,7 @@ def probable_changes(
     given. A change by which tracks only lose detections is not taken over: jolts are less probable
     by the model than they are. A tracklet without a given label is of the marker with bonds, absent
     in its frames, with which the tracks are most probable, among those whose distances it keeps. It
-    is clutter if they are more probable
-    with it as clutter, or as a track of no marker.
+    is clutter if they are more probable with it as clutter, or as a track of no marker.
 
     Parameters
     ----------
