@@ -88,8 +88,11 @@ def test_tracklets_in_doubt_move_to_the_absent_marker(monkeypatch):
     tracks = dataclasses.replace(found.tracks, labels=wrong)
     for each in (stitching, None):
         before = Uncorrected(tracks=tracks, recipe=recipe, model=model, stitching=each)
-        after = own_distances.changed_if_more_probable(before)
+        done: list[int] = []
+        after = own_distances.changed_if_more_probable(before, done.append)
         np.testing.assert_array_equal(after.tracks.labels, labels)
+        assert done == sorted(done)
+        assert done[-1] == person.detections.n_frames
         if each is not None:
             assert after.stitching.tracks is after.tracks
             assert after.tracks.info["joins"] == len(after.stitching.joins)

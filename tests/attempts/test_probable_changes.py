@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import asterism as am
+from asterism.tracking.attempts import absent_markers
 from asterism.tracking.attempts.posterior import (
     log_posterior,
     log_posterior_around,
@@ -68,9 +69,12 @@ def test_a_tracklet_without_a_label_is_of_the_absent_marker_that_fits():
     np.testing.assert_array_equal(changed(given, found), LABELS)
 
 
+@pytest.mark.parametrize("is_compared", [True, False])
 @pytest.mark.parametrize("n_frames", [2, 10, 40])
-def test_an_object_that_is_no_marker_is_no_absent_marker(n_frames):
+def test_an_object_that_is_no_marker_is_no_absent_marker(n_frames, is_compared, monkeypatch):
     """It moves steadily far from the neighbours of the marker that is absent meanwhile."""
+    if not is_compared:  # neither by distances nor by the posterior
+        monkeypatch.setattr(absent_markers, "MAX_DEVIATION", np.inf)
     d, here = TRUTH.detections, of(7, 40, 40 + n_frames)
     at = np.array([[3, 0.02 * t, 1] for t in range(n_frames)])
     first = d.offsets[40:][:n_frames]
