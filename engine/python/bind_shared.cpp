@@ -29,7 +29,8 @@ Point point_of(const In<double>& array, std::size_t row) {
 void make_shared_acceleration(SharedAcceleration* self, const In<std::int64_t>& offsets,
                               const In<std::int32_t>& others, const In<double>& distances,
                               const In<double>& variances, const In<double>& shape,
-                              const In<double>& own_shape, const In<double>& log_weights) {
+                              const In<double>& own_shape, const In<double>& log_weights,
+                              const In<double>& log_begin_weights, double volume) {
   const std::size_t n = others.size();
   require(offsets.ndim() == 1, "offsets: shape (K + 1,)");
   require_offsets(flat(offsets), n, "offsets: rising, within the bonds");
@@ -40,13 +41,16 @@ void make_shared_acceleration(SharedAcceleration* self, const In<std::int64_t>& 
           "own_shape: shape (K, 2 or 3)");
   require(shape.ndim() == 2 && shape.shape(0) == n && shape.shape(1) == own_shape.shape(1),
           "shape: shape (B, D)");
-  require(log_weights.ndim() == 2 && log_weights.shape(0) == K && log_weights.shape(1) == kShared,
-          "log_weights: shape (K, components)");
+  for (const In<double>* each : {&log_weights, &log_begin_weights})
+    require(each->ndim() == 2 && each->shape(0) == K && each->shape(1) == kShared,
+            "log_weights and log_begin_weights: shape (K, components)");
+  require(volume > 0, "volume: > 0");
   std::vector<SharedAcceleration::Marker> markers(K);
   for (std::size_t k = 0; k < K; ++k) {
     SharedAcceleration::Marker& marker = markers[k];
     marker.shape = point_of(own_shape, k);
     std::copy_n(log_weights.data() + k * kShared, kShared, marker.log_weight.begin());
+    std::copy_n(log_begin_weights.data() + k * kShared, kShared, marker.log_begin.begin());
     for (auto b = static_cast<std::size_t>(offsets.data()[k]);
          b < static_cast<std::size_t>(offsets.data()[k + 1]); ++b) {
       const std::int32_t other = others.data()[b];
@@ -55,7 +59,7 @@ void make_shared_acceleration(SharedAcceleration* self, const In<std::int64_t>& 
           {other, 1 / variances.data()[b], distances.data()[b], point_of(shape, b)});
     }
   }
-  new (self) SharedAcceleration(static_cast<int>(own_shape.shape(1)), std::move(markers));
+  new (self) SharedAcceleration(static_cast<int>(own_shape.shape(1)), volume, std::move(markers));
 }
 
 // The detections of markers in frames. A marker with those of two tracks in a frame has none there.
@@ -92,8 +96,8 @@ class MarkerPlaces {
 };
 
 // The log densities (N, components) of the detections of tracks, and the predicted positions and
-// variances, (N, D + 1). Each track is of a marker, -1 for none. The first detection of a track has
-// none, and gets NaN, as those of no marker.
+// variances, (N, D + 1). Each track is of a marker, -1 for none, and those of no marker get NaN. The
+// first detection of a track has no predicted position.
 nb::tuple shared_densities(const SharedAcceleration& shared, const MotionModel& m,
                              const In<std::int32_t>& markers, const In<double>& points,
                              const In<std::int64_t>& frames, const In<std::int64_t>& offsets,
@@ -121,6 +125,8 @@ nb::tuple shared_densities(const SharedAcceleration& shared, const MotionModel& 
       const std::int32_t marker = markers.data()[k];
       if (own.empty() || marker < 0) continue;
       MotionState state = begin_state(m, own[0]);
+      std::ranges::copy(shared.begin_densities(marker, at[0], own[0], m.axis.r, places, memory),
+                        out.data.get() + static_cast<std::size_t>(tracks.offsets[k]) * kShared);
       for (std::size_t i = 1; i < own.size(); ++i) {
         for (std::int64_t t = at[i - 1] + 1; t <= at[i]; ++t) predict(m, line.step(t), state);
         const Prediction prediction(m, state);
@@ -144,7 +150,8 @@ nb::tuple shared_densities(const SharedAcceleration& shared, const MotionModel& 
 void bind_shared(nb::module_& module) {
   nb::class_<SharedAcceleration>(module, "SharedAcceleration")
       .def("__init__", &make_shared_acceleration, nb::kw_only(), "offsets"_a, "others"_a,
-           "distances"_a, "variances"_a, "shape"_a, "own_shape"_a, "log_weights"_a);
+           "distances"_a, "variances"_a, "shape"_a, "own_shape"_a, "log_weights"_a,
+           "log_begin_weights"_a, "volume"_a);
   module.def("shared_densities", &shared_densities, "shared"_a, "model"_a, "markers"_a, "points"_a,
              "frames"_a, "offsets"_a, "times"_a, "kind"_a, "F"_a, "Q"_a);
 }

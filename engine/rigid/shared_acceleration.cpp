@@ -88,10 +88,14 @@ void SharedAcceleration::with_neighbours(const PredictionByMode& own, const Link
       out.set(first + k, combined(before, rigid.at, kRigid[k] * rigid.variance));
   };
   add_rigid(own, kTurn);
+  const auto add_alone = [&](const Carried& place, std::size_t first) {
+    for (std::size_t k = 0; k < kAlone.size(); ++k)
+      out.set(first + k, PredictionByMode(place.at, kAlone[k] * place.variance + own.r, own.r));
+  };
+  if (sight.n >= n_min) add_alone(rigid, kRigidAlone);
   if (!has_shape) return;
-  const PredictionByMode shaped = combined(own, shape.at, shape.variance);
-  out.set(kShape, shaped);
-  add_rigid(shaped, kShape + 1);
+  add_alone(shape, kShapeAlone);
+  if (sight.n >= n_min) add_rigid(combined(own, shape.at, shape.variance), kShape);
 }
 
 SharedAcceleration::Densities SharedAcceleration::densities(const Mixture& mixture,
@@ -123,12 +127,35 @@ SharedAcceleration::Moments SharedAcceleration::moments(std::int32_t marker,
   return out;
 }
 
-double SharedAcceleration::gain(std::int32_t marker, const Densities& each) const {
+SharedAcceleration::Densities SharedAcceleration::begin_densities(std::int32_t marker,
+                                                                  const Sight& sight, const Point& y,
+                                                                  double r, Memory& memory) const {
+  Densities out;
+  out.fill(kNever);
+  out[0] = -log_volume_;
+  if (sight.n_shape < min_for_rotation(D_)) return out;
+  const std::span pairs(sight.shape.data(), sight.n_shape);
+  memory.predictions.each(
+      D_, r, std::span(&pairs, 1),
+      [&](const auto& one, Point& was) {
+        was = markers_[marker].shape;
+        return one;
+      },
+      [&](const auto&, const RigidPrediction& prediction) {
+        const Carried place = prediction.place(r, 1);
+        for (std::size_t k = 0; k < kAlone.size(); ++k)
+          out[kShapeAlone + k] =
+              density(PredictionByMode(place.at, kAlone[k] * place.variance + r, r), y);
+      });
+  return out;
+}
+
+double SharedAcceleration::gain(const Densities& log_weight, const Densities& each) {
   Densities weight{}, joint{};
   std::size_t n = 0;
   for (std::size_t c = 0; c < kComponents; ++c) {
     if (!(each[c] > kNever)) continue;
-    weight[n] = markers_[marker].log_weight[c];
+    weight[n] = log_weight[c];
     joint[n] = weight[n] + each[c];
     ++n;
   }

@@ -20,9 +20,14 @@
 //          detection carries it (rigid/carried.hpp), with its variance times two factors
 //   shape  own and rigid, and the place that the marker has in the shape of the segment: the rigid
 //          motion is that of the neighbours from a frame in which the distances were usual
+//   alone  the place by the rigid motion or by the shape without own motion, with its variance times
+//          two factors: after a jolt, own motion is wrong
 //
 // A place is combined with the own prediction of every mode like a measurement. The neighbours are
 // the kSteadiest markers before it with the steadiest bonds that are detected in both frames.
+//
+// The first detection of a track is anywhere in the volume, or at its place by the shape alone, with
+// weights of their own.
 #pragma once
 
 #include <algorithm>
@@ -71,11 +76,14 @@ class SharedAcceleration {
   static constexpr std::array<double, 2> kField{0.1, 0.5};   // β
   static constexpr std::array<double, 2> kRigid{0.25, 1};    // factors of the variance
   static constexpr double kWide = 8;                         // factor of the variance
-  // Own, still, wide, field and rigid; then own and rigid with the shape.
+  static constexpr std::array<double, 2> kAlone{1, 16};      // factors of the variance
+  // Own, still, wide, field and rigid; rigid with the shape; then the places alone.
   static constexpr std::size_t kWideAt = 1 + kField.size(), kStart = kWideAt + 1;
   static constexpr std::size_t kTurn = kStart + kField.size();
   static constexpr std::size_t kShape = kTurn + kRigid.size();
-  static constexpr std::size_t kComponents = kShape + 1 + kRigid.size();
+  static constexpr std::size_t kRigidAlone = kShape + kRigid.size();
+  static constexpr std::size_t kShapeAlone = kRigidAlone + kAlone.size();
+  static constexpr std::size_t kComponents = kShapeAlone + kAlone.size();
   using Densities = std::array<double, kComponents>;
 
   // A marker before another one in the order, with a bond to it.
@@ -89,7 +97,7 @@ class SharedAcceleration {
     std::vector<Neighbour> before;    // by increasing variance
     std::vector<std::int32_t> after;  // the markers that have it as a neighbour
     Point shape{};
-    Densities log_weight{};
+    Densities log_weight{}, log_begin{};  // log_begin: of the first detection of a track
   };
   // A detection of a marker in a frame, and the one before it.
   struct Link {
@@ -116,7 +124,8 @@ class SharedAcceleration {
     double variance = 0;  // of a measured coordinate
   };
 
-  SharedAcceleration(int D, std::vector<Marker> markers) : D_(D), markers_(std::move(markers)) {
+  SharedAcceleration(int D, double volume, std::vector<Marker> markers)
+      : D_(D), log_volume_(std::log(volume)), markers_(std::move(markers)) {
     for (std::size_t k = 0; k < markers_.size(); ++k)
       for (const Neighbour& other : markers_[k].before)
         markers_[other.marker].after.push_back(static_cast<std::int32_t>(k));
@@ -155,8 +164,27 @@ class SharedAcceleration {
 
   // The log density of a detection by each component, -inf for one that there is not.
   Densities densities(const Mixture& mixture, const Point& y) const;
-  // The log density by the mixture, less that by own motion.
-  double gain(std::int32_t marker, const Densities& each) const;
+  // The same for the first detection of a track; "own" is its density anywhere in the volume. `r` is
+  // the variance of the sensor.
+  template <typename PlaceOf>
+  Densities begin_densities(std::int32_t marker, std::int64_t frame, const Point& y, double r,
+                            PlaceOf&& place_of, Memory& memory) const {
+    Sight sight;
+    for (const Neighbour& other : markers_[marker].before) {
+      if (sight.n_shape == kSteadiest) break;
+      if (std::isnan(other.shape[0])) continue;
+      if (const Point* now = place_of(other.marker, frame); now != nullptr)
+        sight.shape[sight.n_shape++] = {other.shape, *now, other.weight};
+    }
+    return begin_densities(marker, sight, y, r, memory);
+  }
+  // The log density by the mixture, less that of its first component.
+  double gain(std::int32_t marker, const Densities& each) const {
+    return gain(markers_[marker].log_weight, each);
+  }
+  double begin_gain(std::int32_t marker, const Densities& each) const {
+    return gain(markers_[marker].log_begin, each);
+  }
   Moments moments(std::int32_t marker, const Mixture& mixture) const;
 
  private:
@@ -189,12 +217,16 @@ class SharedAcceleration {
   }
   void with_neighbours(const PredictionByMode& own, const Link& link, const Sight& sight,
                        Memory& memory, Mixture& out) const;
+  Densities begin_densities(std::int32_t marker, const Sight& sight, const Point& y, double r,
+                            Memory& memory) const;
+  static double gain(const Densities& log_weight, const Densities& each);
   Field field(std::span<const Arm> arms, double squared_length, double r) const;
   double density(const PredictionByMode& prediction, const Point& y) const;
   // The own prediction, with a place as a measurement of this variance.
   PredictionByMode combined(const PredictionByMode& own, const Point& place, double variance) const;
 
   int D_;
+  double log_volume_;
   std::vector<Marker> markers_;
 };
 

@@ -486,9 +486,11 @@ class SharedAcceleration:
         shape: Floats,
         own_shape: Floats,
         log_weights: Floats,
+        log_begin_weights: Floats,
+        volume: float,
     ) -> None: ...
 
-# (log densities (N, 10) of the detections of tracks, of which each is of a marker or -1; predicted
+# (log densities (N, C) of the detections of tracks, of which each is of a marker or -1; predicted
 # positions and variances (N, D + 1))
 def shared_densities(
     shared: SharedAcceleration,

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     import asterism as am
 
 MOST, RIDGE = 6, 0.05
-FIELD, RIGID, WIDE = (0.1, 0.5), (0.25, 1.0), 8.0
-N = 11
+FIELD, RIGID, WIDE, ALONE = (0.1, 0.5), (0.25, 1.0), 8.0, (1.0, 16.0)
+N = 14
 
 
 def log_sum(logs) -> float:
@@ -120,7 +120,7 @@ def carried(a, b, v, then, r: float):
 
 
 def densities(d, model, shared, labels, markers):
-    """Log densities (N, 11) of the detections of tracks, and moments of the mixture (N, D + 1)."""
+    """Log densities (N, 14) of the detections of tracks, and moments of the mixture (N, D + 1)."""
     found = np.full((d.n_points, N), np.nan)
     moments = np.full((d.n_points, d.n_axes + 1), np.nan)
     kind, F, Q = steps_of(model.motion, d.times)
@@ -141,6 +141,9 @@ def densities(d, model, shared, labels, markers):
             extra = 0.0 if d.covariances is None else float(np.trace(d.covariances[i]) / D)
             if n == 0 or filter_ is None:
                 filter_ = TrackFilter(model, d.points[i], extra)
+                if marker >= 0:
+                    t = int(d.frame_of[i])
+                    found[i] = first_densities(shared, marker, d.points[i], t, place, r, extra)
                 continue
             s, t = (int(d.frame_of[j]) for j in (own[n - 1], i))
             for step in range(s + 1, t + 1):
@@ -190,13 +193,34 @@ def predictions(shared, marker, own, then, when, place, r):
         rigid = carried(*(np.array(each) for each in zip(*pairs, strict=True)), then, r)
         for k, factor in enumerate(RIGID):
             out[6 + k] = own.with_place(rigid[0], factor * rigid[1])
+        for k, factor in enumerate(ALONE):
+            out[10 + k] = Modes([0.0], [rigid[0]], [factor * rigid[1]])
     if len(shape) >= len(then):
         a, b, v = (np.array(each) for each in zip(*shape, strict=True))
-        formed = out[8] = own.with_place(*carried(a, b, v, shared.own_shape[marker], r))
+        at, variance = carried(a, b, v, shared.own_shape[marker], r)
+        for k, factor in enumerate(ALONE):
+            out[12 + k] = Modes([0.0], [at], [factor * variance])
         for k, factor in enumerate(RIGID):
             if rigid is not None:
-                out[9 + k] = formed.with_place(rigid[0], factor * rigid[1])
+                formed = own.with_place(at, variance)
+                out[8 + k] = formed.with_place(rigid[0], factor * rigid[1])
     return out
+
+
+def first_densities(shared, marker, y, t, place, r, extra):
+    """Log densities (14,) of the first detection of a track: in the volume, or by the shape."""
+    found = np.full(N, -np.inf)
+    found[0] = -math.log(shared.volume)
+    seen = []
+    for b in range(shared.offsets[marker], shared.offsets[marker + 1]):
+        now = place(int(shared.others[b]), t)
+        if now is not None and np.isfinite(shared.shape[b, 0]) and len(seen) < MOST:
+            seen.append((shared.shape[b], now, shared.variances[b]))
+    if len(seen) >= len(y):
+        a, b, v = (np.array(each) for each in zip(*seen, strict=True))
+        at, variance = carried(a, b, v, shared.own_shape[marker], r)
+        found[12:] = [gaussian(y, at, factor * variance + r + extra) for factor in ALONE]
+    return found
 
 
 def moments_of(each, weights, r):

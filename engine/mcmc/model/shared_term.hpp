@@ -3,7 +3,8 @@
 //
 // Each track is of the marker whose label the first of its labelled detections was given. The term of
 // a detection depends on the detections of neighbours in its frame, in that of the detection before
-// it, and in the frame before that. A change of tracks changes the terms of
+// it, and in the frame before that; of the first detection of a track, in its frame alone. A change
+// of tracks changes the terms of
 //
 //   own detections from the first change on, because it changes their filter
 //   other markers that have one of theirs as a neighbour in one of these frames
@@ -255,8 +256,9 @@ class SharedTerm {
     const auto is_changed = [&](std::int64_t frame) {
       return frame >= first && is_changed_[static_cast<std::size_t>(frame - first_)] != 0;
     };
-    for (std::int32_t at = end.place - 1; at > 0; --at) {
-      const std::int64_t from = p.window()[nodes[at - 1]].frame, to = p.window()[nodes[at]].frame;
+    for (std::int32_t at = end.place - 1; at >= first_with_term(p.track(end.track)); --at) {
+      const std::int64_t to = p.window()[nodes[at]].frame;
+      const std::int64_t from = at == 0 ? to : p.window()[nodes[at - 1]].frame;
       if (to < first) return;
       const bool has_three = to == from + 1;  // the frames of an acceleration
       if (is_changed(to) || is_changed(from) || (has_three && is_changed(from - 1)))
@@ -287,9 +289,13 @@ class SharedTerm {
     if (std::isnan(value)) value = term(one);
     return value;
   }
+  // The first place in a track whose term may change. A detection after one that has left the window
+  // is settled.
+  static std::int32_t first_with_term(const PartitionTrack& track) { return track.n_gone > 0; }
   double term(const Node& one) {
     const Partition<Filter>& p = one.is_outside ? *whole_ : *part_;
     const auto& nodes = p.track(one.track).nodes;
+    if (one.place == 0) return begin_term(p, p.marker(one.track), nodes[0]);
     const std::int32_t i = nodes[one.place - 1];
     return term(p, p.marker(one.track), p.state(i), i, nodes[one.place],
                 p.track(one.track).n_gone + one.place);
@@ -298,7 +304,8 @@ class SharedTerm {
     const auto& nodes = part_->track(edit.track).nodes;
     double sum = 0;
     if (part_->marker(edit.track) < 0) return sum;
-    for (std::int32_t n = std::max(first_changed(edit), 1);
+    const std::int32_t first = first_with_term(part_->track(edit.track));
+    for (std::int32_t n = std::max(first_changed(edit), first);
          n < static_cast<std::int32_t>(nodes.size()); ++n)
       sum += known({edit.track, n, false});
     return sum;
@@ -309,17 +316,33 @@ class SharedTerm {
     const Tail<Filter>& tail = edit.tail;
     const std::int32_t n_kept = edit.track < 0 ? 0 : part_->track(edit.track).n_gone + edit.keep;
     double sum = 0;
-    for (std::int32_t n = std::max(first_changed(edit), 1); n < edit.keep; ++n) {
-      const auto& nodes = part_->track(edit.track).nodes;
-      const std::int32_t i = nodes[n - 1];
-      sum += term(*part_, marker, part_->state(i), i, nodes[n], part_->track(edit.track).n_gone + n);
+    for (std::int32_t n = first_changed(edit); n < edit.keep; ++n) {
+      const PartitionTrack& track = part_->track(edit.track);
+      if (n < first_with_term(track)) continue;
+      const std::int32_t i = n == 0 ? -1 : track.nodes[n - 1];
+      sum += n == 0 ? begin_term(*part_, marker, track.nodes[0])
+                    : term(*part_, marker, part_->state(i), i, track.nodes[n], track.n_gone + n);
     }
-    for (std::size_t n = edit.keep == 0; n < tail.nodes.size(); ++n) {
+    for (std::size_t n = 0; n < tail.nodes.size(); ++n) {
+      if (edit.keep == 0 && n == 0) {
+        sum += begin_term(*part_, marker, tail.nodes[0]);
+        continue;
+      }
       const std::int32_t i = before(*part_, edit, n);
       sum += term(*part_, marker, n == 0 ? part_->state(i) : tail.states[n - 1], i, tail.nodes[n],
                   n_kept + static_cast<std::int32_t>(n));
     }
     return sum;
+  }
+  // The term of the first detection of a track.
+  double begin_term(const Partition<Filter>& p, std::int32_t marker, std::int32_t j) {
+    if ((*shared_)[marker].before.empty()) return 0;
+    const auto& at = p.window()[j];
+    return shared_->begin_gain(
+        marker, shared_->begin_densities(
+                    marker, at.frame, at.y, p.motion().axis.r,
+                    [&](std::int32_t other, std::int64_t frame) { return place(other, frame); },
+                    memory_));
   }
   // The term of detection j after detection i, which follows `n_before` - 1 others of its track and
   // has this filter state.

@@ -36,7 +36,8 @@ __all__ = ["COMPONENTS", "SharedAcceleration", "shared_gains"]
 
 COMPONENTS = (
     "own", "still 0.1", "still 0.5", "wide 8", "field 0.1", "field 0.5", "rigid 0.25", "rigid 1",
-    "shape", "shape, rigid 0.25", "shape, rigid 1",
+    "shape, rigid 0.25", "shape, rigid 1",
+    "rigid alone 1", "rigid alone 16", "shape alone 1", "shape alone 16",
 )  # fmt: skip
 """Predictions of a detection, with the factors of their variances.
 
@@ -52,9 +53,15 @@ rigid
     By it, and by the rigid motion of its neighbours since the detection before.
 shape
     By it, and by the place of the marker in the shape of its neighbours.
+alone
+    By such a place, without own motion, which is wrong after a jolt.
+
+The first detection of a track is anywhere in the volume ("own"), or at its place in the shape.
 """
 N_OWN = 4
 """Number of the first components: of own motion alone. Without a neighbour there is only "own"."""
+BEGIN = (0, *(c for c, name in enumerate(COMPONENTS) if name.startswith("shape alone")))
+"""Components of the first detection of a track."""
 
 
 @record(eq=False)
@@ -76,8 +83,11 @@ class SharedAcceleration:
         metres; NaN if it was not detected there.
     own_shape : ndarray of shape (K, D)
         Position of the markers themselves in these frames.
-    weights : ndarray of shape (K, C)
-        Weight of each of the `COMPONENTS`, with the sum 1.
+    weights, begin_weights : ndarray of shape (K, C)
+        Weight of each of the `COMPONENTS`, with the sum 1, and the same for the first detection of
+        a track.
+    volume : float
+        Volume in which a track may begin, m³ (m² in 2-D).
     size, size_std : float
         Standard deviation of the acceleration that bonded markers have in common, as the σ of
         `DWNA`, m/s², and its standard error. They describe the capture; the density does not depend
@@ -100,6 +110,8 @@ class SharedAcceleration:
     shape: NDArray[np.float64]
     own_shape: NDArray[np.float64]
     weights: NDArray[np.float64]
+    begin_weights: NDArray[np.float64]
+    volume: float
     size: float = 0.0
     size_std: float = math.nan
 
@@ -115,11 +127,11 @@ class SharedAcceleration:
     def compiled(self) -> _engine.SharedAcceleration:
         """The same as an engine object."""
         with np.errstate(divide="ignore"):
-            log_weights = np.log(self.weights)
+            log_weights, log_begin_weights = np.log(self.weights), np.log(self.begin_weights)
         return _engine.SharedAcceleration(
             offsets=self.offsets, others=self.others, distances=self.distances,
             variances=self.variances, shape=self.shape, own_shape=self.own_shape,
-            log_weights=log_weights,
+            log_weights=log_weights, log_begin_weights=log_begin_weights, volume=self.volume,
         )  # fmt: skip
 
 
@@ -139,10 +151,11 @@ def shared_densities(
     Returns
     -------
     densities : ndarray of shape (N, C)
-        -inf for a component without neighbours; NaN for clutter, the first detection of a track,
-        and a track that is of no marker.
+        -inf for a component without neighbours, or that the first detection of a track does not
+        have; NaN for clutter and a track that is of no marker.
     predicted : ndarray of shape (N, D + 1)
-        Mean of the mixture, metres, and variance of a measured coordinate, m²; NaN as above.
+        Mean of the mixture, metres, and variance of a measured coordinate, m²; NaN as above, and for
+        the first detection of a track.
 
     Raises
     ------
@@ -188,7 +201,7 @@ def shared_gains(
     Returns
     -------
     ndarray of shape (N,)
-        0 for clutter, the first detection of a track, and a track that is of no marker.
+        0 for clutter, and a track that is of no marker.
 
     Raises
     ------
@@ -206,9 +219,14 @@ def shared_gains(
     """
     densities, _ = shared_densities(tracks, model, shared, markers)
     of = _marker_of(tracks, shared, markers)
+    order, offsets = tracks.by_track
+    begins = np.zeros(len(densities), dtype=bool)
+    begins[order[offsets[:-1]]] = True
     gains = np.zeros(len(densities))
     has = np.flatnonzero(np.isfinite(densities[:, 0]))
-    log_weights = _log_weights(densities[has], shared.weights[of[tracks.labels[has]]])
+    marker = of[tracks.labels[has]]
+    weights = np.where(begins[has, None], shared.begin_weights[marker], shared.weights[marker])
+    log_weights = _log_weights(densities[has], weights)
     gains[has] = _log_sum(log_weights + densities[has]) - densities[has, 0]
     return gains
 

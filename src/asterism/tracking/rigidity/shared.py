@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from asterism.checks import check_kind
 from asterism.model import TrackingModel, Tracks
 from asterism.model.shared_acceleration import (
+    BEGIN,
     COMPONENTS,
     N_OWN,
     SharedAcceleration,
@@ -43,7 +45,8 @@ def learn_shared_acceleration(tracks: Tracks, model: TrackingModel) -> SharedAcc
     Bonds are those of all distances, and a marker comes after those of smaller number. Its shape is
     the positions in the frame whose distances are most usual. The weights of the predictions
     maximise the density of the detections (EM); those of each marker are drawn to those of all, and
-    that of own motion is at least `ALONE`. The acceleration in common is that of markers which
+    that of own motion is at least `ALONE`. Those of the first detection of a track are learnt from
+    all detections, as if each were the first. The acceleration in common is that of markers which
     neighbours predict better than own motion does, each with its steadiest bond (`shared_size`).
 
     Parameters
@@ -84,18 +87,27 @@ def learn_shared_acceleration(tracks: Tracks, model: TrackingModel) -> SharedAcc
         offsets.append(offsets[-1] + len(others))
     others = np.concatenate(all_others)
     marker = np.repeat(np.arange(K), np.diff(offsets))
+    extent = np.ptp(tracks.detections.points, axis=0) if K else np.zeros(D)
+    equal = np.ones((K, len(COMPONENTS))) / len(COMPONENTS)
     shared = SharedAcceleration(
         offsets=np.array(offsets), others=others.astype(np.int32),
         distances=distances.middle[marker, others], variances=variance[marker, others],
         shape=np.concatenate(shape), own_shape=own_shape,
-        weights=np.ones((K, len(COMPONENTS))) / len(COMPONENTS),
+        weights=equal, begin_weights=equal,
+        volume=float(np.prod(np.maximum(extent, model.sensor.noise_sigma))),
     )  # fmt: skip
-    densities, _ = shared_densities(tracks, model, shared)
+    densities, predicted = shared_densities(tracks, model, shared)
+    begin = np.where(np.isin(np.arange(len(COMPONENTS)), BEGIN), densities, -np.inf)
+    begin[:, 0] = -math.log(shared.volume)
+    begin_weights = fitted_weights(begin, tracks.labels, K)
+    densities[np.isnan(predicted[:, 0])] = np.nan
     weights = fitted_weights(densities, tracks.labels, K)
     is_led = (weights[:, :N_OWN].sum(axis=1) < 0.5) & (np.diff(offsets) > 0)
     steadiest = np.array(offsets[:-1], dtype=np.int64)[is_led]
     size, size_std = shared_size(tracks, marker[steadiest], others[steadiest])
-    return dataclasses.replace(shared, weights=weights, size=size, size_std=size_std)
+    return dataclasses.replace(
+        shared, weights=weights, begin_weights=begin_weights, size=size, size_std=size_std
+    )
 
 
 def _usual_frame(
