@@ -173,10 +173,7 @@ def test_the_first_detection_of_a_track_says_which_marker_it_is_of():
 
 
 def test_neighbours_predict_a_marker_whose_own_motion_jolts():
-    """A blow that changes the velocity of a whole segment costs each marker but the first a little.
-
-    Without places alone, neighbours could not outweigh an own prediction that is far off.
-    """
+    """A place that is combined with own motion could not outweigh a prediction that is far off."""
     rng = np.random.default_rng(2)
     places, _ = segments(rng, (8,), 300, jump=0.002, own=3e-4, turn=0.02)
     places[200:] += 0.3 * np.arange(1, 101)[:, None, None]

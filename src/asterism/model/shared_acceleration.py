@@ -6,11 +6,12 @@ number:
 
     log π(ω) + Σ gain(y),  gain(y) = log Σ_c w_c p_c(y) - log p(y)
 
-p is the density by the marker's own motion, which `track_scores` has, and p_c are the `COMPONENTS`:
-that density, two with a smaller variance, one with a larger one for jolts, and those in which the
-position is also predicted by the acceleration or by the rigid motion of neighbours
-(`engine/rigid/shared_acceleration.hpp` has the formulas). The weights w_c are learnt for each
-marker. Those of a marker that moves independently are of its own motion alone, the first `N_OWN`.
+p is the density by the marker's own motion, which `track_scores` has, or anywhere in the volume for
+the first detection of a track. p_c are the `COMPONENTS`: that density, two with a smaller variance,
+one with a larger one for jolts, and those in which the position is also, or only, predicted by the
+acceleration or by the rigid motion of neighbours (`engine/rigid/shared_acceleration.hpp` has the
+formulas). The weights w_c are learnt for each marker. Those of a marker that moves independently
+are of its own motion alone, the first `N_OWN`.
 """
 
 from __future__ import annotations
@@ -154,8 +155,8 @@ def shared_densities(
         -inf for a component without neighbours, or that the first detection of a track does not
         have; NaN for clutter and a track that is of no marker.
     predicted : ndarray of shape (N, D + 1)
-        Mean of the mixture, metres, and variance of a measured coordinate, m²; NaN as above, and for
-        the first detection of a track.
+        Mean of the mixture, metres, and variance of a measured coordinate, m²; NaN as above, and
+        for the first detection of a track.
 
     Raises
     ------
