@@ -64,14 +64,13 @@ void SharedAcceleration::with_neighbours(const PredictionByMode& own, const Link
   struct Motion {
     std::span<const RigidPair> pairs;
     const Point* was;
-    Carried* found;
+    Place* found;
   };
-  Carried rigid, shape;
+  Place rigid, shape;
   std::array<Motion, 2> motions;
   std::size_t n = 0;
   if (sight.n >= n_min) motions[n++] = {{sight.pairs.data(), sight.n}, &link.then, &rigid};
-  const bool has_shape = sight.n_shape >= n_min;
-  if (has_shape)
+  if (sight.n_shape >= n_min)
     motions[n++] = {{sight.shape.data(), sight.n_shape}, &markers_[link.marker].shape, &shape};
   memory.predictions.each(
       D_, own.r, std::span(motions).first(n),
@@ -80,22 +79,16 @@ void SharedAcceleration::with_neighbours(const PredictionByMode& own, const Link
         return one.pairs;
       },
       [&](const Motion& one, const RigidPrediction& prediction) {
-        *one.found = prediction.place(own.r, 1);
+        *one.found = Place(prediction, own.r);
       });
   const auto add_rigid = [&](const PredictionByMode& before, std::size_t first) {
-    if (sight.n < n_min) return;
     for (std::size_t k = 0; k < kRigid.size(); ++k)
       out.set(first + k, combined(before, rigid.at, kRigid[k] * rigid.variance));
   };
-  add_rigid(own, kTurn);
-  const auto add_alone = [&](const Carried& place, std::size_t first) {
-    for (std::size_t k = 0; k < kAlone.size(); ++k)
-      out.set(first + k, PredictionByMode(place.at, kAlone[k] * place.variance + own.r, own.r));
-  };
-  if (sight.n >= n_min) add_alone(rigid, kRigidAlone);
-  if (!has_shape) return;
-  add_alone(shape, kShapeAlone);
-  if (sight.n >= n_min) add_rigid(combined(own, shape.at, shape.variance), kShape);
+  if (sight.n >= n_min) add_rigid(own, kTurn);
+  if (rigid.is_alone) out.set(kRigidAlone, rigid.alone(own.r));
+  if (shape.is_alone) out.set(kShapeAlone, shape.alone(own.r));
+  if (n == motions.size()) add_rigid(combined(own, shape.at, shape.variance), kShape);
 }
 
 SharedAcceleration::Densities SharedAcceleration::densities(const Mixture& mixture,
@@ -142,10 +135,8 @@ SharedAcceleration::Densities SharedAcceleration::begin_densities(std::int32_t m
         return one;
       },
       [&](const auto&, const RigidPrediction& prediction) {
-        const Carried place = prediction.place(r, 1);
-        for (std::size_t k = 0; k < kAlone.size(); ++k)
-          out[kShapeAlone + k] =
-              density(PredictionByMode(place.at, kAlone[k] * place.variance + r, r), y);
+        const Place place(prediction, r);
+        if (place.is_alone) out[kShapeAlone] = density(place.alone(r), y);
       });
   return out;
 }

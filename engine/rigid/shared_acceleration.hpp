@@ -20,8 +20,8 @@
 //          detection carries it (rigid/carried.hpp), with its variance times two factors
 //   shape  own and rigid, and the place that the marker has in the shape of the segment: the rigid
 //          motion is that of the neighbours from a frame in which the distances were usual
-//   alone  the place by the rigid motion or by the shape without own motion, with its variance times
-//          two factors: after a jolt, own motion is wrong
+//   alone  the place by the rigid motion or by the shape without own motion, with kAlone times its
+//          variance: after a jolt, own motion is wrong. Uncertain places do not count alone
 //
 // A place is combined with the own prediction of every mode like a measurement. The neighbours are
 // the kSteadiest markers before it with the steadiest bonds that are detected in both frames.
@@ -76,14 +76,17 @@ class SharedAcceleration {
   static constexpr std::array<double, 2> kField{0.1, 0.5};   // β
   static constexpr std::array<double, 2> kRigid{0.25, 1};    // factors of the variance
   static constexpr double kWide = 8;                         // factor of the variance
-  static constexpr std::array<double, 2> kAlone{1, 16};      // factors of the variance
+  static constexpr double kAlone = 4;                        // factor of the variance
+  // Largest standard deviation of a place alone, as a fraction of the distance to the nearest
+  // neighbour.
+  static constexpr double kSharp = 0.1;
   // Own, still, wide, field and rigid; rigid with the shape; then the places alone.
   static constexpr std::size_t kWideAt = 1 + kField.size(), kStart = kWideAt + 1;
   static constexpr std::size_t kTurn = kStart + kField.size();
   static constexpr std::size_t kShape = kTurn + kRigid.size();
   static constexpr std::size_t kRigidAlone = kShape + kRigid.size();
-  static constexpr std::size_t kShapeAlone = kRigidAlone + kAlone.size();
-  static constexpr std::size_t kComponents = kShapeAlone + kAlone.size();
+  static constexpr std::size_t kShapeAlone = kRigidAlone + 1;
+  static constexpr std::size_t kComponents = kShapeAlone + 1;
   using Densities = std::array<double, kComponents>;
 
   // A marker before another one in the order, with a bond to it.
@@ -205,6 +208,16 @@ class SharedAcceleration {
   struct Field {
     Point acceleration{};
     double noise = 0;
+  };
+  // A place by a rigid motion, and whether it counts without own motion.
+  struct Place : Carried {
+    bool is_alone = false;
+
+    Place() = default;
+    Place(const RigidPrediction& prediction, double r)
+        : Carried(prediction.place(r, 1)),
+          is_alone(variance < kSharp * kSharp * prediction.nearest2()) {}
+    PredictionByMode alone(double r) const { return {at, kAlone * variance + r, r}; }
   };
 
   Arm arm(const Point& marker, const Point& earlier, const Point& then, const Point& now) const {

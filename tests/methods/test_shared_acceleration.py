@@ -16,8 +16,8 @@ from tests.references import shared_acceleration as reference
 from tests.references.chain_moves import as_partition, make_chain
 from tests.scenes import interacting, small_model
 
-WEIGHTS = np.array([0.04, 0.01, 0.02, 0.03, 0.14, 0.1, 0.2, 0.1, 0.2, 0.1, 0.02, 0.01, 0.02, 0.01])
-BEGIN_WEIGHTS = np.array([0.2, *[0] * 11, 0.5, 0.3])
+WEIGHTS = np.array([0.04, 0.01, 0.02, 0.03, 0.14, 0.1, 0.2, 0.1, 0.2, 0.1, 0.03, 0.03])
+BEGIN_WEIGHTS = np.array([0.2, *[0] * 10, 0.8])
 VOLUME = 3.0
 
 
@@ -86,7 +86,7 @@ MODELS = {"one motion": small_model(), "several": small_model(motion=interacting
 @pytest.mark.parametrize("extra", [None, 1e-4], ids=["same noise", "own noise"])
 def test_densities_are_those_of_the_reference(n_axes, model, extra):
     rng = np.random.default_rng(n_axes)
-    places, shapes = segments(rng, (8, 4, 1), 12, n_axes=n_axes)
+    places, shapes = segments(rng, (8, 4, 1), 20, n_axes=n_axes)
     tracks = tracks_of(rng, places, missing=0.25, extra=extra)
     shared = made_by_hand(shapes, unknown=(1,))
     # Track 3 is of no marker, and track 4 of a marker that track 5 is of as well.

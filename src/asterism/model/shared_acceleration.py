@@ -37,8 +37,7 @@ __all__ = ["COMPONENTS", "SharedAcceleration", "shared_gains"]
 
 COMPONENTS = (
     "own", "still 0.1", "still 0.5", "wide 8", "field 0.1", "field 0.5", "rigid 0.25", "rigid 1",
-    "shape, rigid 0.25", "shape, rigid 1",
-    "rigid alone 1", "rigid alone 16", "shape alone 1", "shape alone 16",
+    "shape, rigid 0.25", "shape, rigid 1", "rigid alone", "shape alone",
 )  # fmt: skip
 """Predictions of a detection, with the factors of their variances.
 
@@ -55,13 +54,13 @@ rigid
 shape
     By it, and by the place of the marker in the shape of its neighbours.
 alone
-    By such a place, without own motion, which is wrong after a jolt.
+    By such a place, if it is certain, without own motion, which is wrong after a jolt.
 
 The first detection of a track is anywhere in the volume ("own"), or at its place in the shape.
 """
 N_OWN = 4
 """Number of the first components: of own motion alone. Without a neighbour there is only "own"."""
-BEGIN = (0, *(c for c, name in enumerate(COMPONENTS) if name.startswith("shape alone")))
+BEGIN = (0, COMPONENTS.index("shape alone"))
 """Components of the first detection of a track."""
 
 
