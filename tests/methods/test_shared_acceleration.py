@@ -206,6 +206,15 @@ def test_markers_of_a_segment_are_learnt_to_move_together_and_others_not():
     assert of_segment.mean() > 3
 
 
+def test_a_track_without_detections_adds_nothing():
+    truth = am.simulate.cube(frames=30, seed=1)
+    with_empty = am.Tracks(detections=truth.detections, labels=truth.labels, names=(None,) * 9)
+    model = am.estimate_model(truth.detections).model
+    shared = am.tracking.learn_shared_acceleration(with_empty, model)
+    gains = am.model.shared_gains(with_empty, model, shared)
+    assert np.array_equal(gains, am.model.shared_gains(truth, model, shared))
+
+
 def test_of_clutter_nothing_is_learnt():
     truth = am.simulate.cube(frames=30, seed=1)
     clutter = am.Tracks(detections=truth.detections, labels=np.full(len(truth.labels), -1))

@@ -221,7 +221,7 @@ def shared_gains(
     of = _marker_of(tracks, shared, markers)
     order, offsets = tracks.by_track
     begins = np.zeros(len(densities), dtype=bool)
-    begins[order[offsets[:-1]]] = True
+    begins[order[offsets[:-1][np.diff(offsets) > 0]]] = True
     gains = np.zeros(len(densities))
     has = np.flatnonzero(np.isfinite(densities[:, 0]))
     marker = of[tracks.labels[has]]
