@@ -63,7 +63,6 @@ class JointPlaces {
     }
     for (Link& link : links_) link.ratio = ratio(link, 0);
     place_.assign(tracks_.size(), nullptr);
-    chosen_.assign(tracks_.size(), kNone);
   }
 
   // Decides the detection of each track. `candidates` are those of the tracks, ordered by row.
@@ -72,11 +71,7 @@ class JointPlaces {
     for (const Candidate& c : candidates) ++first_[at_row_[c.row] + 1];
     for (std::size_t a = 0; a < tracks_.size(); ++a) first_[a + 1] += first_[a];
     beliefs_.clear();
-    columns_.clear();
-    for (const Candidate& c : candidates) {
-      beliefs_.push_back(c.gain);
-      columns_.push_back(c.column);
-    }
+    for (const Candidate& c : candidates) beliefs_.push_back(c.gain);
     set_up(points, candidates);
     for (int round = 0; round < kRounds; ++round) exchange(candidates, round == 0 ? 1 : kDamping);
     order_.resize(candidates.size());
@@ -84,10 +79,10 @@ class JointPlaces {
     std::ranges::sort(order_, {}, [&](std::int32_t c) { return std::pair(-beliefs_[c], c); });
     is_taken_.assign(points.size(), 0);
     for (const std::int32_t c : order_) {
-      const std::int32_t a = at_row_[candidates[c].row], column = candidates[c].column;
-      if (beliefs_[c] <= 0 || chosen_[a] != kNone || is_taken_[column]) continue;
-      chosen_[a] = c;
-      place_[a] = &points[column];
+      const Point*& place = place_[at_row_[candidates[c].row]];
+      const std::int32_t column = candidates[c].column;
+      if (beliefs_[c] <= 0 || place != nullptr || is_taken_[column]) continue;
+      place = &points[column];
       is_taken_[column] = 1;
     }
   }
@@ -97,25 +92,16 @@ class JointPlaces {
     const std::int32_t a = at_row_[row];
     return a == kNone ? nullptr : place_[a];
   }
-  // Sum of p over the bonds of a row's track to others that have a place, for the detection `y` of a
-  // column. All bonds of a marker may break at once, so that the sum has the bound of one bond.
-  double gain(std::size_t row, std::int32_t column, const Point& y) const {
+  // Sum of p over the bonds of a row's track to others that have a place, for a detection at `y`.
+  // All bonds of a marker may break at once, so that the sum has the bound of one bond.
+  double gain(std::size_t row, const Point& y) const {
     const std::int32_t a = at_row_[row];
     double sum = 0;
     if (a == kNone) return sum;
-    const auto own = columns_.begin() + static_cast<std::ptrdiff_t>(first_[a]);
-    const std::size_t n_own = n_of(a);
-    const auto j = static_cast<std::size_t>(std::find(own, own + n_own, column) - own);
     for (const std::int32_t e : of_track_[a]) {
       const Link& link = links_[e];
-      const std::int32_t b = link.a == a ? link.b : link.a;
-      if (chosen_[b] == kNone) continue;
-      // That of two candidates is known, unless they are the same detection.
-      const std::size_t l = static_cast<std::size_t>(chosen_[b]) - first_[b];
-      if (j == n_own || columns_[static_cast<std::size_t>(chosen_[b])] == column)
-        sum += effect(link, *place_[b], y);
-      else
-        sum += effects_[link.effects + (link.a == a ? j * n_of(b) + l : l * n_own + j)];
+      const Point* other = place_[link.a == a ? link.b : link.a];
+      if (other != nullptr) sum += effect(link, *other, y);
     }
     return std::clamp(sum, kLeast, kMost);
   }
@@ -246,14 +232,12 @@ class JointPlaces {
   void send(std::int32_t from, std::size_t n_from, std::size_t received, std::size_t n,
             std::size_t sent, double share, Effect&& effect_of) {
     double none = 0;
-    without_.resize(n_from);
-    for (std::size_t l = 0; l < n_from; ++l) {
-      without_[l] = beliefs_[first_[from] + l] - messages_[received + l];
-      none = std::max(none, without_[l]);
-    }
+    for (std::size_t l = 0; l < n_from; ++l)
+      none = std::max(none, beliefs_[first_[from] + l] - messages_[received + l]);
     for (std::size_t j = 0; j < n; ++j) {
       double best = 0;
-      for (std::size_t l = 0; l < n_from; ++l) best = std::max(best, effect_of(j, l) + without_[l]);
+      for (std::size_t l = 0; l < n_from; ++l)
+        best = std::max(best, effect_of(j, l) + beliefs_[first_[from] + l] - messages_[received + l]);
       const double message = std::clamp(best - none, -kMaxMessage, kMaxMessage);
       next_[sent + j] = messages_[sent + j] + share * (message - messages_[sent + j]);
     }
@@ -267,10 +251,8 @@ class JointPlaces {
   std::vector<Link> links_;
   std::vector<std::vector<std::int32_t>> of_track_;
   std::vector<std::size_t> first_;  // candidate of each track
-  std::vector<double> beliefs_, effects_, messages_, next_, without_;
-  std::vector<std::int32_t> columns_;  // of the candidates
+  std::vector<double> beliefs_, effects_, messages_, next_;
   std::vector<const Point*> place_;
-  std::vector<std::int32_t> chosen_;   // candidate of each track
   std::vector<char> is_taken_;
 };
 

@@ -64,13 +64,14 @@ void SharedAcceleration::with_neighbours(const PredictionByMode& own, const Link
   struct Motion {
     std::span<const RigidPair> pairs;
     const Point* was;
-    Place* found;
+    Carried* found;
   };
-  Place rigid, shape;
+  Carried rigid, shape;
   std::array<Motion, 2> motions;
   std::size_t n = 0;
   if (sight.n >= n_min) motions[n++] = {{sight.pairs.data(), sight.n}, &link.then, &rigid};
-  if (sight.n_shape >= n_min)
+  const bool has_shape = sight.n_shape >= n_min;
+  if (has_shape)
     motions[n++] = {{sight.shape.data(), sight.n_shape}, &markers_[link.marker].shape, &shape};
   memory.predictions.each(
       D_, own.r, std::span(motions).first(n),
@@ -79,16 +80,18 @@ void SharedAcceleration::with_neighbours(const PredictionByMode& own, const Link
         return one.pairs;
       },
       [&](const Motion& one, const RigidPrediction& prediction) {
-        *one.found = Place(prediction, own.r);
+        *one.found = prediction.place(own.r, 1);
       });
   const auto add_rigid = [&](const PredictionByMode& before, std::size_t first) {
+    if (sight.n < n_min) return;
     for (std::size_t k = 0; k < kRigid.size(); ++k)
       out.set(first + k, combined(before, rigid.at, kRigid[k] * rigid.variance));
   };
-  if (sight.n >= n_min) add_rigid(own, kTurn);
-  if (rigid.is_alone) out.set(kRigidAlone, rigid.alone(own.r));
-  if (shape.is_alone) out.set(kShapeAlone, shape.alone(own.r));
-  if (n == motions.size()) add_rigid(combined(own, shape.at, shape.variance), kShape);
+  add_rigid(own, kTurn);
+  if (!has_shape) return;
+  const PredictionByMode shaped = combined(own, shape.at, shape.variance);
+  out.set(kShape, shaped);
+  add_rigid(shaped, kShape + 1);
 }
 
 SharedAcceleration::Densities SharedAcceleration::densities(const Mixture& mixture,
@@ -135,8 +138,8 @@ SharedAcceleration::Densities SharedAcceleration::begin_densities(std::int32_t m
         return one;
       },
       [&](const auto&, const RigidPrediction& prediction) {
-        const Place place(prediction, r);
-        if (place.is_alone) out[kShapeAlone] = density(place.alone(r), y);
+        const Carried place = prediction.place(r, 1);
+        out[kShape] = density(PredictionByMode(place.at, kBegin * place.variance + r, r), y);
       });
   return out;
 }

@@ -20,14 +20,12 @@
 //          detection carries it (rigid/carried.hpp), with its variance times two factors
 //   shape  own and rigid, and the place that the marker has in the shape of the segment: the rigid
 //          motion is that of the neighbours from a frame in which the distances were usual
-//   alone  the place by the rigid motion or by the shape without own motion, with kAlone times its
-//          variance: after a jolt, own motion is wrong. Uncertain places do not count alone
 //
 // A place is combined with the own prediction of every mode like a measurement. The neighbours are
 // the kSteadiest markers before it with the steadiest bonds that are detected in both frames.
 //
-// The first detection of a track is anywhere in the volume, or at its place by the shape alone, with
-// weights of their own.
+// The first detection of a track is anywhere in the volume, or at the place that the marker has in
+// the shape, with kBegin times its variance. The weights of both are learnt for each marker as well.
 #pragma once
 
 #include <algorithm>
@@ -75,18 +73,12 @@ class SharedAcceleration {
  public:
   static constexpr std::array<double, 2> kField{0.1, 0.5};   // β
   static constexpr std::array<double, 2> kRigid{0.25, 1};    // factors of the variance
-  static constexpr double kWide = 8;                         // factor of the variance
-  static constexpr double kAlone = 4;                        // factor of the variance
-  // Largest standard deviation of a place alone, as a fraction of the distance to the nearest
-  // neighbour.
-  static constexpr double kSharp = 0.1;
-  // Own, still, wide, field and rigid; rigid with the shape; then the places alone.
+  static constexpr double kWide = 8, kBegin = 4;             // factors of the variance
+  // Own, still, wide, field and rigid; then own and rigid with the shape.
   static constexpr std::size_t kWideAt = 1 + kField.size(), kStart = kWideAt + 1;
   static constexpr std::size_t kTurn = kStart + kField.size();
   static constexpr std::size_t kShape = kTurn + kRigid.size();
-  static constexpr std::size_t kRigidAlone = kShape + kRigid.size();
-  static constexpr std::size_t kShapeAlone = kRigidAlone + 1;
-  static constexpr std::size_t kComponents = kShapeAlone + 1;
+  static constexpr std::size_t kComponents = kShape + 1 + kRigid.size();
   using Densities = std::array<double, kComponents>;
 
   // A marker before another one in the order, with a bond to it.
@@ -167,8 +159,8 @@ class SharedAcceleration {
 
   // The log density of a detection by each component, -inf for one that there is not.
   Densities densities(const Mixture& mixture, const Point& y) const;
-  // The same for the first detection of a track; "own" is its density anywhere in the volume. `r` is
-  // the variance of the sensor.
+  // The same for the first detection of a track: "own" is that of the volume. `r` is the variance of
+  // the sensor.
   template <typename PlaceOf>
   Densities begin_densities(std::int32_t marker, std::int64_t frame, const Point& y, double r,
                             PlaceOf&& place_of, Memory& memory) const {
@@ -208,16 +200,6 @@ class SharedAcceleration {
   struct Field {
     Point acceleration{};
     double noise = 0;
-  };
-  // A place by a rigid motion, and whether it counts without own motion.
-  struct Place : Carried {
-    bool is_alone = false;
-
-    Place() = default;
-    Place(const RigidPrediction& prediction, double r)
-        : Carried(prediction.place(r, 1)),
-          is_alone(variance < kSharp * kSharp * prediction.nearest2()) {}
-    PredictionByMode alone(double r) const { return {at, kAlone * variance + r, r}; }
   };
 
   Arm arm(const Point& marker, const Point& earlier, const Point& then, const Point& now) const {

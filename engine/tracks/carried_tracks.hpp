@@ -257,7 +257,7 @@ class CarriedTracks {
       if (!live[c.row].is_confirmed()) continue;
       const bool was_listed = c.gain > min_gain;
       if (has_alternatives || is_ambiguous(c, min_gain)) {
-        const double nats = s_.joint.gain(c.row, c.column, points[c.column]);
+        const double nats = s_.joint.gain(c.row, points[c.column]);
         if (nats != 0) s_.bond_gains.push_back({c.row, c.column, nats});
         c.gain += nats;
       }

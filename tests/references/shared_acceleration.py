@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     import asterism as am
 
 MOST, RIDGE = 6, 0.05
-FIELD, RIGID, WIDE, ALONE, SHARP = (0.1, 0.5), (0.25, 1.0), 8.0, 4.0, 0.1
-N = 12
+FIELD, RIGID, WIDE, BEGIN = (0.1, 0.5), (0.25, 1.0), 8.0, 4.0
+N = 11
 
 
 def log_sum(logs) -> float:
@@ -120,7 +120,7 @@ def carried(a, b, v, then, r: float):
 
 
 def densities(d, model, shared, labels, markers):
-    """Log densities (N, 12) of the detections of tracks, and moments of the mixture (N, D + 1)."""
+    """Log densities (N, 11) of the detections of tracks, and moments of the mixture (N, D + 1)."""
     found = np.full((d.n_points, N), np.nan)
     moments = np.full((d.n_points, d.n_axes + 1), np.nan)
     kind, F, Q = steps_of(model.motion, d.times)
@@ -193,22 +193,17 @@ def predictions(shared, marker, own, then, when, place, r):
         rigid = carried(*(np.array(each) for each in zip(*pairs, strict=True)), then, r)
         for k, factor in enumerate(RIGID):
             out[6 + k] = own.with_place(rigid[0], factor * rigid[1])
-        if is_sharp(rigid[1], [was for was, _, _ in pairs], then):
-            out[10] = Modes([0.0], [rigid[0]], [ALONE * rigid[1]])
     if len(shape) >= len(then):
         a, b, v = (np.array(each) for each in zip(*shape, strict=True))
-        at, variance = carried(a, b, v, shared.own_shape[marker], r)
-        if is_sharp(variance, a, shared.own_shape[marker]):
-            out[11] = Modes([0.0], [at], [ALONE * variance])
+        formed = out[8] = own.with_place(*carried(a, b, v, shared.own_shape[marker], r))
         for k, factor in enumerate(RIGID):
             if rigid is not None:
-                formed = own.with_place(at, variance)
-                out[8 + k] = formed.with_place(rigid[0], factor * rigid[1])
+                out[9 + k] = formed.with_place(rigid[0], factor * rigid[1])
     return out
 
 
 def first_densities(shared, marker, y, t, place, r, extra):
-    """Log densities (12,) of the first detection of a track: in the volume, or by the shape."""
+    """Log densities (11,) of the first detection of a track: in the volume, or by the shape."""
     found = np.full(N, -np.inf)
     found[0] = -math.log(shared.volume)
     seen = []
@@ -219,14 +214,8 @@ def first_densities(shared, marker, y, t, place, r, extra):
     if len(seen) >= len(y):
         a, b, v = (np.array(each) for each in zip(*seen, strict=True))
         at, variance = carried(a, b, v, shared.own_shape[marker], r)
-        if is_sharp(variance, a, shared.own_shape[marker]):
-            found[11] = gaussian(y, at, ALONE * variance + r + extra)
+        found[8] = gaussian(y, at, BEGIN * variance + r + extra)
     return found
-
-
-def is_sharp(variance: float, neighbours, then) -> bool:
-    """Whether a place counts without own motion."""
-    return math.sqrt(variance) < SHARP * min(math.dist(x, then) for x in neighbours)
 
 
 def moments_of(each, weights, r):

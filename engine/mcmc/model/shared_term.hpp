@@ -294,11 +294,15 @@ class SharedTerm {
   static std::int32_t first_with_term(const PartitionTrack& track) { return track.n_gone > 0; }
   double term(const Node& one) {
     const Partition<Filter>& p = one.is_outside ? *whole_ : *part_;
-    const auto& nodes = p.track(one.track).nodes;
-    if (one.place == 0) return begin_term(p, p.marker(one.track), nodes[0]);
-    const std::int32_t i = nodes[one.place - 1];
-    return term(p, p.marker(one.track), p.state(i), i, nodes[one.place],
-                p.track(one.track).n_gone + one.place);
+    return term(p, p.marker(one.track), p.track(one.track), one.place);
+  }
+  // The term of the detection at a place in a track, as if the track were of this marker.
+  double term(const Partition<Filter>& p, std::int32_t marker, const PartitionTrack& track,
+              std::int32_t at) {
+    const std::int32_t j = track.nodes[at];
+    if (at == 0) return begin_term(p, marker, j);
+    const std::int32_t i = track.nodes[at - 1];
+    return term(p, marker, p.state(i), i, j, track.n_gone + at);
   }
   double own_terms(const Edit<Filter>& edit) {
     const auto& nodes = part_->track(edit.track).nodes;
@@ -316,12 +320,10 @@ class SharedTerm {
     const Tail<Filter>& tail = edit.tail;
     const std::int32_t n_kept = edit.track < 0 ? 0 : part_->track(edit.track).n_gone + edit.keep;
     double sum = 0;
-    for (std::int32_t n = first_changed(edit); n < edit.keep; ++n) {
+    if (edit.keep > 0) {
       const PartitionTrack& track = part_->track(edit.track);
-      if (n < first_with_term(track)) continue;
-      const std::int32_t i = n == 0 ? -1 : track.nodes[n - 1];
-      sum += n == 0 ? begin_term(*part_, marker, track.nodes[0])
-                    : term(*part_, marker, part_->state(i), i, track.nodes[n], track.n_gone + n);
+      for (std::int32_t n = std::max(first_changed(edit), first_with_term(track)); n < edit.keep; ++n)
+        sum += term(*part_, marker, track, n);
     }
     for (std::size_t n = 0; n < tail.nodes.size(); ++n) {
       if (edit.keep == 0 && n == 0) {

@@ -8,7 +8,7 @@ number:
 
 p is the density by the marker's own motion, which `track_scores` has, or anywhere in the volume for
 the first detection of a track. p_c are the `COMPONENTS`: that density, two with a smaller variance,
-one with a larger one for jolts, and those in which the position is also, or only, predicted by the
+one with a larger one for jolts, and those in which the position is also predicted by the
 acceleration or by the rigid motion of neighbours (`engine/rigid/shared_acceleration.hpp` has the
 formulas). The weights w_c are learnt for each marker. Those of a marker that moves independently
 are of its own motion alone, the first `N_OWN`.
@@ -37,7 +37,7 @@ __all__ = ["COMPONENTS", "SharedAcceleration", "shared_gains"]
 
 COMPONENTS = (
     "own", "still 0.1", "still 0.5", "wide 8", "field 0.1", "field 0.5", "rigid 0.25", "rigid 1",
-    "shape, rigid 0.25", "shape, rigid 1", "rigid alone", "shape alone",
+    "shape", "shape, rigid 0.25", "shape, rigid 1",
 )  # fmt: skip
 """Predictions of a detection, with the factors of their variances.
 
@@ -53,15 +53,11 @@ rigid
     By it, and by the rigid motion of its neighbours since the detection before.
 shape
     By it, and by the place of the marker in the shape of its neighbours.
-alone
-    By such a place, if it is certain, without own motion, which is wrong after a jolt.
 
 The first detection of a track is anywhere in the volume ("own"), or at its place in the shape.
 """
 N_OWN = 4
 """Number of the first components: of own motion alone. Without a neighbour there is only "own"."""
-BEGIN = (0, COMPONENTS.index("shape alone"))
-"""Components of the first detection of a track."""
 
 
 @record(eq=False)
@@ -217,15 +213,12 @@ def shared_gains(
     >>> bool(am.model.shared_gains(truth, model, shared).sum() > 1000)
     True
     """
-    densities, _ = shared_densities(tracks, model, shared, markers)
+    densities, predicted = shared_densities(tracks, model, shared, markers)
     of = _marker_of(tracks, shared, markers)
-    order, offsets = tracks.by_track
-    begins = np.zeros(len(densities), dtype=bool)
-    begins[order[offsets[:-1][np.diff(offsets) > 0]]] = True
     gains = np.zeros(len(densities))
     has = np.flatnonzero(np.isfinite(densities[:, 0]))
-    marker = of[tracks.labels[has]]
-    weights = np.where(begins[has, None], shared.begin_weights[marker], shared.weights[marker])
+    is_first, marker = np.isnan(predicted[has, 0]), of[tracks.labels[has]]
+    weights = np.where(is_first[:, None], shared.begin_weights[marker], shared.weights[marker])
     log_weights = _log_weights(densities[has], weights)
     gains[has] = _log_sum(log_weights + densities[has]) - densities[has, 0]
     return gains

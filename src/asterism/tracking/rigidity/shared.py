@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +10,6 @@ import numpy as np
 from asterism.checks import check_kind
 from asterism.model import TrackingModel, Tracks
 from asterism.model.shared_acceleration import (
-    BEGIN,
     COMPONENTS,
     N_OWN,
     SharedAcceleration,
@@ -33,8 +31,9 @@ MISSING = 4.0
 largest that counts."""
 PRIOR = 20.0
 """Detections for which the weights of all markers count in those of each marker."""
-ALONE = 0.03
-"""Least weight of a marker's own motion: neighbours may move otherwise than where it was learnt."""
+MIN_OWN = 0.03
+"""Minimum weight of a marker's own motion, and of the volume for a first detection: neighbours may
+move otherwise than where it was learnt."""
 ROUNDS = 30
 """Number of iterations of the weights."""
 
@@ -45,8 +44,8 @@ def learn_shared_acceleration(tracks: Tracks, model: TrackingModel) -> SharedAcc
     Bonds are those of all distances, and a marker comes after those of smaller number. Its shape is
     the positions in the frame whose distances are most usual. The weights of the predictions
     maximise the density of the detections (EM); those of each marker are drawn to those of all, and
-    that of own motion is at least `ALONE`. Those of the first detection of a track are learnt from
-    all detections, as if each were the first. The acceleration in common is that of markers which
+    that of own motion is at least `MIN_OWN`. The weights of a first detection are learnt from all
+    detections, as if each began a track. The acceleration in common is that of markers which
     neighbours predict better than own motion does, each with its steadiest bond (`shared_size`).
 
     Parameters
@@ -87,19 +86,15 @@ def learn_shared_acceleration(tracks: Tracks, model: TrackingModel) -> SharedAcc
         offsets.append(offsets[-1] + len(others))
     others = np.concatenate(all_others)
     marker = np.repeat(np.arange(K), np.diff(offsets))
-    extent = np.ptp(tracks.detections.points, axis=0) if K else np.zeros(D)
     equal = np.ones((K, len(COMPONENTS))) / len(COMPONENTS)
     shared = SharedAcceleration(
         offsets=np.array(offsets), others=others.astype(np.int32),
         distances=distances.middle[marker, others], variances=variance[marker, others],
         shape=np.concatenate(shape), own_shape=own_shape,
-        weights=equal, begin_weights=equal,
-        volume=float(np.prod(np.maximum(extent, model.sensor.noise_sigma))),
+        weights=equal, begin_weights=equal, volume=_volume(tracks.detections.points),
     )  # fmt: skip
+    begin_weights = fitted_weights(_as_first(tracks, model, shared), tracks.labels, K)
     densities, predicted = shared_densities(tracks, model, shared)
-    begin = np.where(np.isin(np.arange(len(COMPONENTS)), BEGIN), densities, -np.inf)
-    begin[:, 0] = -math.log(shared.volume)
-    begin_weights = fitted_weights(begin, tracks.labels, K)
     densities[np.isnan(predicted[:, 0])] = np.nan
     weights = fitted_weights(densities, tracks.labels, K)
     is_led = (weights[:, :N_OWN].sum(axis=1) < 0.5) & (np.diff(offsets) > 0)
@@ -108,6 +103,23 @@ def learn_shared_acceleration(tracks: Tracks, model: TrackingModel) -> SharedAcc
     return dataclasses.replace(
         shared, weights=weights, begin_weights=begin_weights, size=size, size_std=size_std
     )
+
+
+def _volume(points: NDArray[np.float64]) -> float:
+    """Return the volume of all points, as in the densities per volume of an estimated model."""
+    extent = np.ptp(points, axis=0) if len(points) else np.zeros(points.shape[1])
+    return float(np.prod(np.maximum(extent, 0.1 * max(extent.max(), 1e-3))))
+
+
+def _as_first(
+    tracks: Tracks, model: TrackingModel, shared: SharedAcceleration
+) -> NDArray[np.float64]:
+    """Return the log densities, shape (N, C), of all detections as if each began a track."""
+    has = np.flatnonzero(tracks.labels >= 0)
+    labels = np.full(len(tracks.labels), -1)
+    labels[has] = np.arange(len(has))
+    apart = Tracks(detections=tracks.detections, labels=labels)
+    return shared_densities(apart, model, shared, tracks.labels[has])[0]
 
 
 def _usual_frame(
@@ -162,4 +174,4 @@ def fitted_weights(
             [np.bincount(labels, each, minlength=n_markers) for each in share.T], axis=1
         )
         weights = (sums + PRIOR * common) / (sums.sum(axis=1, keepdims=True) + PRIOR)
-    return (1 - ALONE) * weights + ALONE * alone
+    return (1 - MIN_OWN) * weights + MIN_OWN * alone
