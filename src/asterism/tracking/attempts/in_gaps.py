@@ -8,11 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from asterism.filter import smooth_states
 from asterism.tracking.attempts.near_markers import with_clutter_near_markers
-from asterism.tracking.filling.estimates import DenseTracks, estimate
-from asterism.tracking.filling.gaps import LONGEST
-from asterism.tracking.filling.scores import settle
-from asterism.tracking.filling.spans import Span, find_gaps
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -20,34 +17,37 @@ if TYPE_CHECKING:
     from asterism.model import TrackingModel, Tracks
     from asterism.tracking.stitching import Stitching
 
-__all__ = ["MAX_CELLS", "with_detections_in_gaps"]
+__all__ = ["with_detections_in_gaps"]
 
 DEGREES = 3.0
-"""Degrees of freedom of Student's t, the distribution of a detection around the fill of a gap.
-Jolts that the motion model excludes are in its tails."""
-ENOUGH = 6.0
+"""Degrees of freedom of Student's t, the distribution of a detection around its expected place."""
+JOLT = 4.0
+"""Factor of its standard deviation: a detection without a track is one that the motion model did
+not expect."""
+MIN_LOG_ODDS = 6.0
 """Log odds from which a detection is taken, as those of a lost marker."""
 LEAD = 3.0
 """Log odds by which it must exceed those of others for the gap, and of other gaps for it."""
-MARGIN = 2.0
-"""Factor of the largest deviation of a track from straight lines of the length of a gap, within
-which detections are compared with its fill; but at least the distance of `_reach`."""
-MAX_GAPS = 3000
-"""Largest number of gaps that are filled; each takes some milliseconds."""
-MAX_LINES = 400
-"""Number of such lines, spread over the capture."""
-MAX_CELLS = 30_000_000
-"""Largest product of frames and tracks; positions of so many take 0.7 GB."""
+MAX_SHARE = 0.9
+"""Largest variance of a smoothed position, in those of the sensor, with which the error of a
+detection is measured: then it is not smoothed from this detection alone."""
+N_PRIOR = 20
+"""Number of detections with the expected error that count besides those of a track."""
+BLOCK = 2_000_000
+"""Largest number of frames times tracks at once; their states take 0.3 GB."""
+MARGIN = 500
+"""Number of frames before and after a block that are smoothed with it."""
 
 
 def with_detections_in_gaps(found: Stitching, model: TrackingModel) -> Stitching:
     """Add detections without a track to stitched tracks that have a gap there.
 
-    A track may lose its marker where it moves by more than the model admits. A gap is filled as by
-    `fill_gaps`, with a standard deviation. The hypothesis that a detection in it is of the marker
-    is compared with a missed detection and clutter, as dense as near other markers. It is added if
-    its log odds exceed `ENOUGH`, so that the link is no uncertain decision, and those of all other
-    hypotheses for the gap in this frame, and for the detection, by `LEAD`.
+    A track may lose its marker where it moves by more than the model admits. The hypothesis that a
+    detection in a gap is of the marker is compared with a missed detection and clutter, as dense as
+    near other markers. The marker is expected at the position that is smoothed from its detections,
+    with `JOLT` times the usual error of its detections. One is added if its log odds exceed
+    `MIN_LOG_ODDS`, so that the link is no uncertain decision, and those of all other hypotheses for
+    the gap in this frame, and for the detection, by `LEAD`.
 
     Parameters
     ----------
@@ -74,12 +74,10 @@ def with_detections_in_gaps(found: Stitching, model: TrackingModel) -> Stitching
     >>> with_detections_in_gaps(am.stitch(missed, model), model).tracks.info["in_gaps"]
     1
     """
-    tracks = found.tracks
-    if tracks.detections.n_frames * tracks.n_tracks > MAX_CELLS:
-        return found
-    taken, before, log_odds = _clear(found, model)
-    labels, tracklets = tracks.labels.copy(), found.tracklets.copy()
-    labels[taken], tracklets[taken] = labels[before], tracklets[before]
+    tracks, tracklets = found.tracks, found.tracklets.copy()
+    taken, track, log_odds = _clear(found, model)
+    labels = tracks.labels.copy()
+    labels[taken], tracklets[taken] = track, tracklets[_before(tracks, taken, track)]
     confidence = None if tracks.confidence is None else tracks.confidence.copy()
     if confidence is not None:
         confidence[taken] = 1 / (1 + np.exp(-log_odds))
@@ -91,105 +89,118 @@ def with_detections_in_gaps(found: Stitching, model: TrackingModel) -> Stitching
 def _clear(
     found: Stitching, model: TrackingModel
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
-    """Return detections that are clearly in a gap, those before the gap, and the log odds."""
+    """Return detections that are clearly in a gap, the tracks of the gaps, and the log odds."""
     tracks, d = found.tracks, found.tracks.detections
-    free = np.flatnonzero(found.tracklets < 0)
-    if not len(free):
-        return free, free, np.empty(0)
-    dense = DenseTracks(times=d.times, positions=tracks.positions(), model=model)
-    model = with_clutter_near_markers(model, tracks)
-    at, track, log_odds, before = [free[:0]], [free[:0]], [np.empty(0)], [free[:0]]
-    for span, inside in _compared(dense, free, d.points, d.frame_of, _reach(model, d.n_axes)):
-        fill, frame = settle(estimate(dense, span)), d.frame_of[inside]
-        n = frame - span.first
-        squared = ((d.points[inside] - fill.points[n]) ** 2).sum(axis=1)
-        at.append(inside)
-        track.append(np.full(len(inside), span.track))
-        log_odds.append(
-            _log_density(squared, fill.stds[n] ** 2 + model.sensor.noise_sigma**2, d.n_axes)
-            + _log_odds_of_detection(frame == span.first, frame == span.last, model)
-            - math.log(model.sensor.clutter_density)
+    is_free, near = found.tracklets < 0, with_clutter_near_markers(model, tracks)
+    n = max(BLOCK // max(tracks.n_tracks, 1), 1)
+    blocks = []
+    for first in range(0, d.n_frames, n):
+        begin, end = max(first - MARGIN, 0), min(first + n + MARGIN, d.n_frames)
+        start = int(d.offsets[begin])
+        one, track, log_odds = _hypotheses(
+            tracks.part(begin, end), is_free[start : d.offsets[end]], model, near
         )
-        before.append(np.full(len(inside), _last(tracks, span)))
-    one, other, odds = np.concatenate(at), np.concatenate(track), np.concatenate(log_odds)
-    gap = other * d.n_frames + d.frame_of[one]
-    is_clear = odds > ENOUGH
-    for key in (one, gap):
-        is_clear &= odds > _best_other(key, odds) + LEAD
-    return one[is_clear], np.concatenate(before)[is_clear], odds[is_clear]
+        one += start
+        is_own = (d.frame_of[one] >= first) & (d.frame_of[one] < first + n)
+        blocks.append((one[is_own], track[is_own], log_odds[is_own]))
+    one, track, log_odds = (np.concatenate(each) for each in zip(*blocks, strict=True))
+    is_clear = log_odds > MIN_LOG_ODDS
+    for key in (one, track * d.n_frames + d.frame_of[one]):
+        is_clear &= log_odds > _best_other(key, log_odds) + LEAD
+    return one[is_clear], track[is_clear], log_odds[is_clear]
 
 
-def _compared(
-    dense: DenseTracks,
-    free: NDArray[np.int64],
-    points: NDArray[np.float64],
-    frame_of: NDArray[np.int64],
-    min_reach: float,
-) -> list[tuple[Span, NDArray[np.int64]]]:
-    """Find gaps of one frame, or of at most `LONGEST`, with the free detections near a line.
+def _hypotheses(
+    tracks: Tracks, is_free: NDArray[np.bool_], model: TrackingModel, near: TrackingModel
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """Return every free detection in a frame of a gap, the track, and the log odds that it is in.
 
-    Near is within `MARGIN` times the largest deviation of the track from such lines elsewhere, and
-    within the given distance, metres. Of more than `MAX_GAPS` those with the nearest are returned.
-    """
-    reach: dict[tuple[int, int], float] = {}
-    spans, frame = find_gaps(dense.seen), frame_of[free]
-    firsts = np.searchsorted(frame, [span.first for span in spans])
-    ends = np.searchsorted(frame, [span.last + 1 for span in spans])
-    found: list[tuple[Span, NDArray[np.int64]]] = []
-    nearest: list[float] = []
-    for span, first, end in zip(spans, firsts.tolist(), ends.tolist(), strict=True):
-        # Rounded to nanoseconds, because times such as k / 120 differ in their last bits.
-        seconds = round(float(dense.times[span.last + 1] - dense.times[span.first - 1]), 9)
-        if first == end or (seconds > LONGEST and span.length > 1):
-            continue
-        y, key = dense.positions[:, span.track], (span.track, span.length)
-        if key not in reach:
-            reach[key] = max(MARGIN * _largest_deviation(y, span.length), min_reach)
-        inside = free[first:end]
-        share = (frame[first:end] - span.first + 1)[:, None] / (span.length + 1)
-        line = (1 - share) * y[span.first - 1] + share * y[span.last + 1]
-        off = np.linalg.norm(points[inside] - line, axis=1)
-        if (near := off <= reach[key]).any():
-            found.append((span, inside[near]))
-            nearest.append(off.min())
-    order = np.sort(np.argsort(nearest, kind="stable")[:MAX_GAPS])
-    return [found[n] for n in order]
-
-
-def _reach(model: TrackingModel, n_axes: int) -> float:
-    """Return the distance at which a detection and clutter are equal if a fill has only noise."""
-    sensor, shape = model.sensor, (DEGREES + n_axes) / 2
-    peak = _log_density(np.zeros(1), np.full(1, sensor.noise_sigma**2), n_axes)[0]
-    n = (peak - math.log(sensor.clutter_density)) / shape
-    return sensor.noise_sigma * math.sqrt((DEGREES - 2) * math.expm1(max(n, 0.0)))
-
-
-def _largest_deviation(y: NDArray[np.float64], length: int) -> float:
-    """Return the largest distance from lines between detections with so many frames between.
+    Those whose log odds are too small to matter are left out.
 
     Parameters
     ----------
-    y : ndarray of shape (T, D)
-        Positions, metres, NaN where not measured.
-    length : int
-        Number of frames between.
+    tracks : Tracks
+        Tracks.
+    is_free : ndarray of bool, shape (N,)
+        True for detections that may be taken.
+    model : TrackingModel
+        Model of the motion.
+    near : TrackingModel
+        Model of detections and clutter.
     """
-    starts = np.arange(len(y) - length - 1)
-    starts = starts[np.isfinite(y[starts, 0] + y[starts + length + 1, 0])]
-    starts = starts[:: -(-len(starts) // MAX_LINES) or 1]
-    largest = 0.0
-    for n in range(1, length + 1):
-        share = n / (length + 1)
-        off = y[starts + n] - (1 - share) * y[starts] - share * y[starts + length + 1]
-        largest = np.fmax(largest, np.nanmax((off**2).sum(axis=1), initial=0.0))
-    return math.sqrt(largest)
+    d, H = tracks.detections, model.motion.modes[0].observation
+    states = smooth_states(tracks, model)
+    places, variances = states.means @ H, (states.covariances @ H) @ H
+    n_of = np.diff(states.offsets)
+    track, row_of = np.repeat(np.arange(len(n_of)), n_of), states.offsets[:-1] - states.first_frames
+    frame = np.arange(len(track)) - row_of[track]
+    own = np.flatnonzero(tracks.labels >= 0)
+    label = tracks.labels[own]
+    row = row_of[label] + d.frame_of[own]
+    error = d.points[own] - places[row]
+    usual = _usual_variance(label, error, variances[row], model.sensor.noise_sigma**2, len(n_of))
+    is_missed = np.ones(len(track), dtype=bool)
+    is_missed[row] = False
+    missed, free = np.flatnonzero(is_missed), np.flatnonzero(is_free)
+    n_in_frame = np.bincount(d.frame_of[free], minlength=d.n_frames)
+    n = n_in_frame[frame[missed]]
+    gap = np.repeat(missed, n)
+    last = np.cumsum(n_in_frame)[frame[missed]]  # in the order of `free`, the one after
+    one = free[np.arange(len(gap)) + np.repeat(last - np.cumsum(n), n)]
+    is_first, is_last = ~is_missed[gap - 1], ~is_missed[gap + 1]
+    variance = usual[track[gap]] * (variances[gap] + model.sensor.noise_sigma**2)
+    squared = ((d.points[one] - places[gap]) ** 2).sum(axis=1)
+    log_odds = (
+        _log_density(squared, JOLT**2 * variance, d.n_axes)
+        + _log_odds_of_detection(is_first, is_last, near)
+        - math.log(near.sensor.clutter_density)
+    )
+    matters = log_odds > MIN_LOG_ODDS - LEAD
+    return one[matters], track[gap][matters], log_odds[matters]
 
 
-def _last(tracks: Tracks, span: Span) -> int:
-    """Return the last detection of a track before a gap."""
-    order, offsets = tracks.by_track
-    own = order[offsets[span.track] : offsets[span.track + 1]]
-    return int(own[np.searchsorted(tracks.detections.frame_of[own], span.first) - 1])
+def _usual_variance(
+    track: NDArray[np.int64],
+    error: NDArray[np.float64],
+    variance: NDArray[np.float64],
+    noise: float,
+    n_tracks: int,
+) -> NDArray[np.float64]:
+    """Return for each track the mean squared error of its detections, in the variances expected.
+
+    The error is that against the position smoothed from all others. From the one smoothed from all,
+    with the variance P where that of the sensor is r, it follows as error / (1 - P / r), with the
+    variance r / (1 - P / r).
+
+    Parameters
+    ----------
+    track : ndarray of int, shape (n,)
+        Track of each detection.
+    error : ndarray of shape (n, D)
+        Difference from the smoothed position, metres.
+    variance : ndarray of shape (n,)
+        Variance of a coordinate of the smoothed position, m².
+    noise : float
+        Variance of the sensor, m².
+    n_tracks : int
+        Number of tracks K.
+    """
+    share = variance / noise
+    is_known = share <= MAX_SHARE
+    squared = (error[is_known] ** 2).mean(axis=1) / ((1 - share[is_known]) * noise)
+    of = track[is_known]
+    n, total = (np.bincount(of, weights, n_tracks) for weights in (None, squared))
+    return (total + N_PRIOR) / (n + N_PRIOR)
+
+
+def _before(
+    tracks: Tracks, detections: NDArray[np.int64], track: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Return the last detection of each track before a detection in one of its gaps."""
+    n_frames, frame_of = tracks.detections.n_frames, tracks.detections.frame_of
+    order, _ = tracks.by_track
+    keys = tracks.labels[order] * n_frames + frame_of[order]
+    return order[np.searchsorted(keys, track * n_frames + frame_of[detections]) - 1]
 
 
 def _best_other(key: NDArray[np.int64], odds: NDArray[np.float64]) -> NDArray[np.float64]:

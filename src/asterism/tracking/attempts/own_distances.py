@@ -9,7 +9,7 @@ import numpy as np
 
 from asterism._engine import ExchangeEvidence
 from asterism.metrics import oracle_tracks
-from asterism.tracking.attempts.in_gaps import MAX_CELLS, with_detections_in_gaps
+from asterism.tracking.attempts.in_gaps import with_detections_in_gaps
 from asterism.tracking.attempts.lost import with_lost_markers
 from asterism.tracking.attempts.moved_tracklets import with_moved_tracklets
 from asterism.tracking.attempts.posterior import log_posterior_around
@@ -42,6 +42,8 @@ __all__ = [
 MAX_ROUNDS = 4
 """Largest number of times that labels are changed by distances learnt from the tracks, each time
 from those of the time before."""
+MAX_CELLS = 30_000_000
+"""Largest product of frames and tracks; positions of so many take 0.7 GB."""
 PRESENT = 0.3
 """Smallest share of the frames in which a marker of such a set is detected."""
 MARKERS = range(4, 201)
