@@ -96,17 +96,19 @@ class MarkerPlaces {
 };
 
 // The log densities (N, components) of the detections of tracks, and the predicted positions and
-// variances, (N, D + 1). Each track is of a marker, -1 for none, and those of no marker get NaN. The
-// first detection of a track has no predicted position.
+// variances, (N, D + 1). Each track is of a marker, -1 for none, and those of no marker and those
+// that are not counted get NaN. The first detection of a track has no predicted position.
 nb::tuple shared_densities(const SharedAcceleration& shared, const MotionModel& m,
-                             const In<std::int32_t>& markers, const In<double>& points,
-                             const In<std::int64_t>& frames, const In<std::int64_t>& offsets,
-                             const In<double>& times, const In<std::int32_t>& kind,
-                             const In<double>& F, const In<double>& Q) {
+                             const In<std::int32_t>& markers, const In<bool>& is_counted,
+                             const In<double>& points, const In<std::int64_t>& frames,
+                             const In<std::int64_t>& offsets, const In<double>& times,
+                             const In<std::int32_t>& kind, const In<double>& F,
+                             const In<double>& Q) {
   const TrackPoints tracks(points, frames, offsets, m.axis.D, times.size());
   const Timeline line = timeline(m, times, kind, F, Q);
   require(shared.n_axes() == m.axis.D, "shared: as many axes as the model");
   require(markers.size() == tracks.n_tracks(), "markers: one for each track");
+  require(is_counted.size() == tracks.n_tracks(), "is_counted: one for each track");
   require_within(flat(markers), -1, static_cast<std::int32_t>(shared.size()), "markers: known ones");
   const auto D = static_cast<std::size_t>(m.axis.D);
   Owned<double> out(tracks.points.size() * kShared), predicted(tracks.points.size() * (D + 1));
@@ -123,7 +125,7 @@ nb::tuple shared_densities(const SharedAcceleration& shared, const MotionModel& 
       const auto own = tracks.points_of(k);
       const auto at = tracks.frames_of(k);
       const std::int32_t marker = markers.data()[k];
-      if (own.empty() || marker < 0) continue;
+      if (own.empty() || marker < 0 || !is_counted.data()[k]) continue;
       MotionState state = begin_state(m, own[0]);
       std::ranges::copy(shared.begin_densities(marker, at[0], own[0], m.axis.r, places, memory),
                         out.data.get() + static_cast<std::size_t>(tracks.offsets[k]) * kShared);
@@ -152,6 +154,6 @@ void bind_shared(nb::module_& module) {
       .def("__init__", &make_shared_acceleration, nb::kw_only(), "offsets"_a, "others"_a,
            "distances"_a, "variances"_a, "shape"_a, "own_shape"_a, "log_weights"_a,
            "log_begin_weights"_a, "volume"_a);
-  module.def("shared_densities", &shared_densities, "shared"_a, "model"_a, "markers"_a, "points"_a,
-             "frames"_a, "offsets"_a, "times"_a, "kind"_a, "F"_a, "Q"_a);
+  module.def("shared_densities", &shared_densities, "shared"_a, "model"_a, "markers"_a,
+             "is_counted"_a, "points"_a, "frames"_a, "offsets"_a, "times"_a, "kind"_a, "F"_a, "Q"_a);
 }

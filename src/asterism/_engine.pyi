@@ -496,6 +496,7 @@ def shared_densities(
     shared: SharedAcceleration,
     model: MotionModel,
     markers: Shorts,
+    is_counted: NDArray[np.bool_],
     points: Floats,
     frames: Ints,
     offsets: Ints,

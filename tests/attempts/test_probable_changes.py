@@ -8,8 +8,8 @@ import pytest
 import asterism as am
 from asterism.tracking.attempts import absent_markers
 from asterism.tracking.attempts.posterior import (
+    gain_of_change,
     log_posterior,
-    log_posterior_around,
     within_limits,
 )
 from asterism.tracking.attempts.probable_changes import _labels_of_markers, probable_changes
@@ -110,20 +110,24 @@ def test_the_posterior_is_that_of_the_pieces_between_excluded_gaps():
 
 
 @pytest.mark.parametrize("begin", [0, 40, 100])
-def test_the_posterior_around_a_change_differs_as_much_as_that_of_the_whole(begin):
-    wrong = exchanged(LABELS, 3, 5, begin, begin + 4)
-    changed = np.flatnonzero(wrong != LABELS)
-    whole, around = (
-        [posterior(labels) for labels in (LABELS, wrong)]
-        for posterior in (
-            lambda labels: log_posterior(
-                am.Tracks(detections=TRUTH.detections, labels=labels), MODEL, SHARED
-            ),
-            lambda labels: log_posterior_around(changed, TRUTH, labels, MODEL, SHARED),
-        )
+@pytest.mark.parametrize("change", [
+    lambda begin: exchanged(LABELS, 3, 5, begin, begin + 4),
+    lambda begin: np.where(of(30, begin, begin + 6), -1, LABELS),
+    lambda begin: np.where(of(30, begin, 120), 44, np.where(LABELS == 44, -1, LABELS)),
+])  # fmt: skip
+def test_the_gain_of_a_change_is_that_of_the_whole_posterior(begin, change):
+    wrong = change(begin)
+    d, changed = TRUTH.detections, np.flatnonzero(wrong != LABELS)
+    whole, other = (
+        log_posterior(am.Tracks(detections=d, labels=labels), MODEL, SHARED)
+        for labels in (LABELS, wrong)
     )
-    assert around[0] != pytest.approx(whole[0])  # not of all frames
-    assert around[0] - around[1] == pytest.approx(whole[0] - whole[1], abs=0.01)
+    assert gain_of_change(changed, LABELS, wrong, TRUTH, MODEL, SHARED) == pytest.approx(
+        other - whole, abs=0.01
+    )
+    assert gain_of_change(changed, wrong, LABELS, TRUTH, MODEL, SHARED) == pytest.approx(
+        whole - other, abs=0.01
+    )
 
 
 def test_tracklets_are_of_the_first_label_given_to_them():

@@ -107,6 +107,10 @@ def test_densities_are_those_of_the_reference(n_axes, model, extra):
     np.testing.assert_allclose(predicted, moments, rtol=1e-7, atol=1e-9)
     assert np.isfinite(found).sum(axis=0).min() >= 8  # every component is there somewhere
     gains = am.model.shared_gains(tracks, model, shared, markers)
+    is_counted = np.arange(tracks.n_tracks) % 3 == 1  # the others are still neighbours
+    some = am.model.shared_gains(tracks, model, shared, markers, is_counted)
+    is_of_them = np.append(is_counted, False)[tracks.labels]
+    np.testing.assert_array_equal(some, np.where(is_of_them, gains, 0))
     first = {int(np.flatnonzero(tracks.labels == k)[0]) for k in range(tracks.n_tracks)}
     assert np.isfinite(found[[*first], COMPONENTS.index("shape")]).sum() >= 3
     for i in range(len(gains)):

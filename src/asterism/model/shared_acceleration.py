@@ -130,25 +130,45 @@ class SharedAcceleration:
             log_weights=log_weights, log_begin_weights=log_begin_weights, volume=self.volume,
         )  # fmt: skip
 
+    def concerned(self, markers: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return which markers have gains that depend on the detections of some of them.
+
+        Parameters
+        ----------
+        markers : ndarray of int, shape (n,)
+            Markers.
+
+        Returns
+        -------
+        ndarray of bool, shape (K,)
+            True for the markers themselves, and for those that they predict.
+        """
+        found = np.zeros(len(self.weights), dtype=bool)
+        found[markers] = True
+        later = np.repeat(np.arange(len(found)), np.diff(self.offsets))
+        found[later[found[self.others]]] = True
+        return found
+
 
 def shared_densities(
     tracks: Tracks,
     model: TrackingModel,
     shared: SharedAcceleration,
     markers: NDArray[np.int64] | None = None,
+    is_counted: NDArray[np.bool_] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Compute the log density of each detection by each component, and the predictions.
 
     Parameters
     ----------
-    tracks, model, shared, markers
+    tracks, model, shared, markers, is_counted
         As for `shared_gains`.
 
     Returns
     -------
     densities : ndarray of shape (N, C)
         -inf for a component without neighbours, or that the first detection of a track does not
-        have; NaN for clutter and a track that is of no marker.
+        have; NaN for clutter, and for a track that is of no marker or not counted.
     predicted : ndarray of shape (N, D + 1)
         Mean of the mixture, metres, and variance of a measured coordinate, m²; NaN as above, and
         for the first detection of a track.
@@ -162,14 +182,18 @@ def shared_densities(
     check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
     check_kind("shared", shared, SharedAcceleration, "am.tracking.learn_shared_acceleration(…)")
     d, of = tracks.detections, _marker_of(tracks, shared, markers)
+    if is_counted is None:
+        is_counted = np.ones(tracks.n_tracks, dtype=bool)
+    elif is_counted.shape != of.shape:
+        raise ParameterError("is_counted", f"{tracks.n_tracks} truth values", is_counted)
     order, offsets = tracks.by_track
     kind, F, Q = steps_of(model.motion, d.times)
     points = with_noise(d.points, d.covariances)
     found = np.full((d.n_points, len(COMPONENTS)), np.nan)
     predicted = np.full((d.n_points, d.n_axes + 1), np.nan)
     found[order], predicted[order] = _engine.shared_densities(
-        shared.compiled, motion_model(model, d.n_axes), of.astype(np.int32), points[order],
-        d.frame_of[order], offsets, d.times, kind, F, Q,
+        shared.compiled, motion_model(model, d.n_axes), of.astype(np.int32), is_counted,
+        points[order], d.frame_of[order], offsets, d.times, kind, F, Q,
     )  # fmt: skip
     return found, predicted
 
@@ -179,6 +203,7 @@ def shared_gains(
     model: TrackingModel,
     shared: SharedAcceleration,
     markers: NDArray[np.int64] | None = None,
+    is_counted: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.float64]:
     """Compute what shared accelerations add to the log density of each detection, in nats.
 
@@ -193,16 +218,18 @@ def shared_gains(
     markers : array_like of int, shape (K,), optional
         Marker of each track, -1 for none; by default track k is of marker k. A marker that has
         detections of two tracks in a frame is no neighbour there.
+    is_counted : ndarray of bool, shape (K,), optional
+        Tracks whose gains are computed, all by default. The others are neighbours only.
 
     Returns
     -------
     ndarray of shape (N,)
-        0 for clutter, and a track that is of no marker.
+        0 for clutter, and for a track that is of no marker or not counted.
 
     Raises
     ------
     ParameterError
-        If there is not one marker for each track.
+        If there is not one marker, or one truth value, for each track.
 
     Examples
     --------
@@ -213,7 +240,7 @@ def shared_gains(
     >>> bool(am.model.shared_gains(truth, model, shared).sum() > 1000)
     True
     """
-    densities, predicted = shared_densities(tracks, model, shared, markers)
+    densities, predicted = shared_densities(tracks, model, shared, markers, is_counted)
     of = _marker_of(tracks, shared, markers)
     gains = np.zeros(len(densities))
     has = np.flatnonzero(np.isfinite(densities[:, 0]))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.tracking.attempts.posterior import log_posterior_around
+from asterism.tracking.attempts.posterior import gain_of_change
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -86,10 +86,7 @@ class AbsentMarkers:
         ]  # fmt: skip
         if not candidates:
             return -np.inf, -1
-        found = [self._log_posterior(detections, k) for k in candidates]
-        best = int(np.argmax(found))
-        now = self._log_posterior(detections, int(own[0]))
-        return found[best] - now, candidates[best]
+        return max((self._log_odds(detections, k), k) for k in candidates)
 
     def move(self, detections: NDArray[np.int64], marker: int) -> None:
         """Give detections with the same label to a marker that is absent in their frames.
@@ -119,11 +116,9 @@ class AbsentMarkers:
         known = squares[np.isfinite(squares)]
         return float(np.minimum(known, MAX_TERM).mean()) if len(known) else np.inf
 
-    def _log_posterior(self, detections: NDArray[np.int64], marker: int) -> float:
-        own = self.labels[detections]
-        self.labels[detections] = marker
-        log_posterior = log_posterior_around(
-            detections, self._tracks, self.labels, self._model, self._shared
+    def _log_odds(self, detections: NDArray[np.int64], marker: int) -> float:
+        after = self.labels.copy()
+        after[detections] = marker
+        return gain_of_change(
+            detections, self.labels, after, self._tracks, self._model, self._shared
         )
-        self.labels[detections] = own
-        return log_posterior

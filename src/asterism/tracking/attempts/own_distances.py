@@ -12,7 +12,7 @@ from asterism.metrics import oracle_tracks
 from asterism.tracking.attempts.in_gaps import with_detections_in_gaps
 from asterism.tracking.attempts.lost import with_lost_markers
 from asterism.tracking.attempts.moved_tracklets import with_moved_tracklets
-from asterism.tracking.attempts.posterior import log_posterior_around
+from asterism.tracking.attempts.posterior import gain_of_change
 from asterism.tracking.attempts.shared_search import searched_with_shared_accelerations
 from asterism.tracking.confidence.identity import OTHER_JOIN
 from asterism.tracking.confidence.reassign import ghost_log_odds, reassigned
@@ -248,11 +248,7 @@ def changed_if_more_probable(
     def accepts(
         before: NDArray[np.int64], after: NDArray[np.int64], changed: NDArray[np.int64]
     ) -> bool:
-        with_it, without = (
-            log_posterior_around(changed, found.tracks, labels, model, shared)
-            for labels in (after, before)
-        )
-        return with_it > without + EXCHANGE
+        return gain_of_change(changed, before, after, found.tracks, model, shared) > EXCHANGE
 
     exchanged = _exchanged(found, ExchangeEvidence.motion, accepts)
     if exchanged is not found:

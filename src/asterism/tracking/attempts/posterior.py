@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 
     from asterism.model import SharedAcceleration, TrackingModel
 
-__all__ = ["log_posterior", "log_posterior_around", "within_limits"]
+__all__ = ["gain_of_change", "log_posterior", "within_limits"]
 
 AROUND = 50
-"""Number of frames, besides the longest gap, before and after a change in which its probability is
-compared. By then the filter has forgotten it."""
+"""Number of frames, besides the longest gap, before and after a change in which the log posterior
+is compared. By then the filter has forgotten it."""
 
 
 def log_posterior(
@@ -39,41 +39,59 @@ def log_posterior(
     shared : SharedAcceleration, optional
         Shared accelerations; by default there are none.
     """
-    pieces = within_limits(tracks, model)
-    scores = track_scores(pieces, model)
-    own = float(scores[np.isfinite(scores)].sum())
-    if shared is None:
-        return own
-    order, offsets = pieces.by_track
-    markers = tracks.labels[order[offsets[:-1]]]
-    return own + float(shared_gains(pieces, model, shared, markers).sum())
+    is_counted = None if shared is None else np.ones(len(shared.weights), dtype=bool)
+    return _log_posterior(tracks, model, shared, is_counted)
 
 
-def log_posterior_around(
+def gain_of_change(
     changed: NDArray[np.int64],
+    before: NDArray[np.int64],
+    after: NDArray[np.int64],
     tracks: Tracks,
-    labels: NDArray[np.int64],
     model: TrackingModel,
     shared: SharedAcceleration,
 ) -> float:
-    """Return the log posterior of tracks with other labels, in the frames around some detections.
+    """Return the change of the log posterior of tracks with other labels for some detections.
 
     Parameters
     ----------
     changed : ndarray of int, shape (n,)
         Detections in time order.
-    tracks : Tracks
-        Tracks of markers.
-    labels : ndarray of int, shape (N,)
+    before, after : ndarray of int, shape (N,)
         Track of each detection, -1 for clutter.
+    tracks : Tracks
+        Tracks of these detections.
     model, shared
         As for `log_posterior`.
     """
     d, margin = tracks.detections, AROUND + model.population.max_gap
     first = max(int(d.frame_of[changed[0]]) - margin, 0)
     end = min(int(d.frame_of[changed[-1]]) + margin + 1, d.n_frames)
-    part = Tracks(detections=d.part(first, end), labels=labels[d.offsets[first] : d.offsets[end]])
-    return log_posterior(part, model, shared)
+    inside, part = slice(d.offsets[first], d.offsets[end]), d.part(first, end)
+    markers = np.concatenate([before[changed], after[changed]])
+    is_concerned = shared.concerned(markers[markers >= 0])
+    without, with_it = (
+        _log_posterior(Tracks(detections=part, labels=labels[inside]), model, shared, is_concerned)
+        for labels in (before, after)
+    )
+    return with_it - without
+
+
+def _log_posterior(
+    tracks: Tracks,
+    model: TrackingModel,
+    shared: SharedAcceleration | None,
+    is_counted: NDArray[np.bool_] | None,
+) -> float:
+    """Return the log posterior of tracks, with the gains of some markers."""
+    pieces = within_limits(tracks, model)
+    scores = track_scores(pieces, model)
+    own = float(scores[np.isfinite(scores)].sum())
+    if shared is None or is_counted is None:
+        return own
+    order, offsets = pieces.by_track
+    of = tracks.labels[order[offsets[:-1]]]
+    return own + float(shared_gains(pieces, model, shared, of, is_counted[of]).sum())
 
 
 def within_limits(tracks: Tracks, model: TrackingModel) -> Tracks:

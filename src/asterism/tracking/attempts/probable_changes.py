@@ -12,7 +12,7 @@ import numpy as np
 
 from asterism.model import Tracks
 from asterism.tracking.attempts.absent_markers import AbsentMarkers
-from asterism.tracking.attempts.posterior import log_posterior, log_posterior_around
+from asterism.tracking.attempts.posterior import gain_of_change, log_posterior
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -58,9 +58,7 @@ def probable_changes(
         before = labels.copy()
         before[change] = given[change]
         is_loss = (labels[change] < 0).all()
-        if is_loss or log_posterior_around(
-            change, tracks, before, model, shared
-        ) >= log_posterior_around(change, tracks, labels, model, shared):
+        if is_loss or gain_of_change(change, before, labels, tracks, model, shared) <= 0:
             labels = before
     markers = AbsentMarkers(tracks, labels, model, shared)
     for tracklet in _groups(found):
