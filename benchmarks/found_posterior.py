@@ -34,7 +34,7 @@ PIECE = 100
 NEAR = 1.0
 """Log posterior below that of the truth that still counts as reached, nats."""
 SHARED_MOVES = 20
-"""Moves of MCMCDA with shared accelerations, each of which takes twenty times as long."""
+"""Moves of MCMCDA with shared accelerations, which take seven times as long."""
 
 
 def pieces(truth: am.Tracks) -> list[tuple[int, int]]:

@@ -9,6 +9,7 @@
 //   own_prediction  the same as Gaussians
 //   weigh       the log likelihood of the point with which `take` will update
 //   take        state after the update with this point
+//   is_close    whether two states differ by less than 10⁻⁴ standard deviations
 #pragma once
 
 #include <algorithm>
@@ -22,6 +23,19 @@
 #include "rigid/shared_acceleration.hpp"
 
 namespace asterism {
+
+inline bool is_close(const AxisModel& m, const AxisState& a, const AxisState& b) {
+  constexpr double kClose = 1e-4;
+  for (int i = 0; i < m.n; ++i) {
+    const double variance = a.P[i * m.n + i];
+    if (std::abs(b.P[i * m.n + i] - variance) > kClose * variance) return false;
+    for (int d = 0; d < m.D; ++d) {
+      const double off = b.x[d][i] - a.x[d][i];
+      if (off * off > kClose * kClose * variance) return false;
+    }
+  }
+  return true;
+}
 
 // The filter of a single motion model. The steps of a gap are composed into one.
 //
@@ -115,6 +129,9 @@ class OneMotion {
     out.P = gain.covariance(m.axis.n, share);
     out.node = y.r > 0 ? -1 : e.node;
   }
+  static bool is_close(const MotionModel& m, const State& a, const State& b) {
+    return asterism::is_close(m.axis, a, b);
+  }
 
  private:
   static constexpr std::size_t kMaxNodes = 1 << 16;
@@ -183,6 +200,12 @@ class SeveralMotions {
   static void take(const MotionModel& m, const Expected& e, const Point& y, State& out) {
     out = e.state;
     update(m, e.each, e.log_likelihood, y, out);
+  }
+  static bool is_close(const MotionModel& m, const State& a, const State& b) {
+    for (int k = 0; k < m.M; ++k)
+      if (std::abs(b.w[k] - a.w[k]) > 1e-4 || !asterism::is_close(m.axis, a.mode[k], b.mode[k]))
+        return false;
+    return true;
   }
 };
 

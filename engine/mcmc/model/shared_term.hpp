@@ -9,6 +9,9 @@
 //   own detections from the first change on, because it changes their filter
 //   other markers that have one of theirs as a neighbour in one of these frames
 //
+// Once the filter has forgotten the change, the terms of later own detections are taken to be the
+// same.
+//
 // Tracks of the whole partition that are not in the part are fixed, as are its fixed places: the term
 // is conditional on them.
 // A marker with detections of two tracks in a frame has no place there.
@@ -319,6 +322,7 @@ class SharedTerm {
     if (marker < 0) return 0;
     const Tail<Filter>& tail = edit.tail;
     const std::int32_t n_kept = edit.track < 0 ? 0 : part_->track(edit.track).n_gone + edit.keep;
+    mark_changed_neighbours(marker);
     double sum = 0;
     if (edit.keep > 0) {
       const PartitionTrack& track = part_->track(edit.track);
@@ -331,10 +335,36 @@ class SharedTerm {
         continue;
       }
       const std::int32_t i = before(*part_, edit, n);
-      sum += term(*part_, marker, n == 0 ? part_->state(i) : tail.states[n - 1], i, tail.nodes[n],
-                  n_kept + static_cast<std::int32_t>(n));
+      const std::int32_t j = tail.nodes[n];
+      const auto& state = n == 0 ? part_->state(i) : tail.states[n - 1];
+      sum += stays(marker, state, i, j)
+                 ? known({part_->track_of(j), part_->place_of(j), false})
+                 : term(*part_, marker, state, i, j, n_kept + static_cast<std::int32_t>(n));
     }
     return sum;
+  }
+  // Marks the frames in which a neighbour of a marker has changed.
+  void mark_changed_neighbours(std::int32_t marker) {
+    is_near_changed_.assign(static_cast<std::size_t>(n_frames_), 0);
+    const auto& neighbours = (*shared_)[marker].before;
+    for (const Changed& one : changed_)
+      if (std::ranges::find(neighbours, one.marker, &SharedAcceleration::Neighbour::marker) !=
+          neighbours.end())
+        is_near_changed_[static_cast<std::size_t>(one.frame - first_)] = 1;
+  }
+  // Whether the term of detection j after detection i, with this filter state, is the same as before:
+  // it follows i already, for the same marker, in practically the same state, and the neighbours are
+  // the same in all frames on which the term depends.
+  bool stays(std::int32_t marker, const typename Filter::State& state, std::int32_t i,
+             std::int32_t j) const {
+    const std::int32_t k = part_->track_of(j), at = part_->place_of(j);
+    if (k < 0 || at == 0 || part_->track(k).nodes[at - 1] != i) return false;
+    const auto has_changed = [&](std::int64_t frame) {
+      return frame >= first_ && is_near_changed_[static_cast<std::size_t>(frame - first_)] != 0;
+    };
+    const std::int64_t from = part_->window()[i].frame, to = part_->window()[j].frame;
+    return !has_changed(to) && !has_changed(from) && !has_changed(from - 1) &&
+           Filter::is_close(part_->motion(), state, part_->state(i)) && part_->marker(k) == marker;
   }
   // The term of the first detection of a track.
   double begin_term(const Partition<Filter>& p, std::int32_t marker, std::int32_t j) {
@@ -370,7 +400,7 @@ class SharedTerm {
   std::vector<std::vector<Point>> slots_;           // detections by marker and frame
   std::vector<std::vector<std::int32_t>> outside_;  // tracks of the whole partition by marker
   std::vector<std::vector<Node>> inside_;           // kept parts of the tracks of the part by marker
-  std::vector<char> is_inside_, is_changed_;  // tracks and frames
+  std::vector<char> is_inside_, is_changed_, is_near_changed_;  // tracks, and frames
   std::vector<Changed> all_, changed_;
   std::vector<Node> dependent_;
   // Terms in the present state, by detection of the part and of the whole partition.
