@@ -82,8 +82,8 @@ def most_certain(
     with bonds must be more certain by `DOUBTFUL`, because it uses distances as the confidence does.
     Then further passes follow (`next_pass`), until one is not more certain. The best is
     `assigned_again`. If it has bonds and identities are still uncertain, so is an attempt with the
-    motion in tracks of single frames, and the more certain of both is the result. It is
-    `searched_again` while it is uncertain, and then `changed_if_more_probable`. If it still is
+    motion in tracks of single frames, and the more certain of both is the result. While identities
+    are uncertain, `searched_again` follows, and then `changed_if_more_probable`. If they still are
     uncertain, and detections are more probable without the motion that most markers have in common,
     all this is done without it, which must be more certain by `DOUBTFUL`. For `progress`, the first
     method is half of the work, and every other attempt, pass or search half of what is left.

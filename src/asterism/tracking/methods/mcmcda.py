@@ -80,7 +80,7 @@ class MCMCDA(EngineMethod):
         with several chains ``info["rhat"]`` measures the convergence of the confidence.
     threads : int
         Number of chains that run at the same time, 1 to 1024. The result does not depend on it.
-        With shared accelerations only the chains of the same group do.
+        With shared accelerations one group is sampled after the other, each by all chains.
     keep : {"best", "draw"}
         Partition of a chain that is kept: the best visited one, or the last one, which is drawn
         from the posterior of the open frames given the decided ones. Draws with different seeds
