@@ -80,6 +80,16 @@ def test_blocks_of_a_capture_take_what_the_whole_takes(monkeypatch, length):
     assert found.info["in_gaps"] == 1
 
 
+@pytest.mark.parametrize("n", [1, 2, 7])
+def test_pairs_are_compared_in_any_number_at_a_time(monkeypatch, n):
+    is_missed = np.random.default_rng(n).random(len(TRUTH.labels)) < 0.1
+    is_missed[TRUTH.detections.frame_of % 59 == 0] = False
+    before = stitched(np.where(is_missed, -1, TRUTH.labels))
+    monkeypatch.setattr(in_gaps, "PAIRS", n)
+    found = with_detections_in_gaps(before, MODEL).tracks.labels
+    np.testing.assert_array_equal(found, before.tracks.labels[:N][TRUTH.labels])
+
+
 def test_a_detection_is_in_the_tracklet_before_the_gap():
     before = missed([0, 0, 0])
     tracklets, own = before.tracklets.copy(), before.tracks.labels == before.tracks.labels[0]

@@ -12,6 +12,8 @@ from asterism.filter import smooth_states
 from asterism.tracking.attempts.near_markers import with_clutter_near_markers
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
     from asterism.model import TrackingModel, Tracks
@@ -37,6 +39,8 @@ BLOCK = 2_000_000
 """Largest number of frames times tracks at once; their states take 0.3 GB."""
 MARGIN = 500
 """Number of frames before and after a block that are smoothed with it."""
+PAIRS = 1_000_000
+"""Number of hypotheses that are compared at once."""
 
 
 def with_detections_in_gaps(found: Stitching, model: TrackingModel) -> Stitching:
@@ -141,22 +145,48 @@ def _hypotheses(
     usual = _usual_variance(label, error, variances[row], model.sensor.noise_sigma**2, len(n_of))
     is_missed = np.ones(len(track), dtype=bool)
     is_missed[row] = False
-    missed, free = np.flatnonzero(is_missed), np.flatnonzero(is_free)
-    n_in_frame = np.bincount(d.frame_of[free], minlength=d.n_frames)
-    n = n_in_frame[frame[missed]]
-    gap = np.repeat(missed, n)
-    last = np.cumsum(n_in_frame)[frame[missed]]  # in the order of `free`, the one after
-    one = free[np.arange(len(gap)) + np.repeat(last - np.cumsum(n), n)]
-    is_first, is_last = ~is_missed[gap - 1], ~is_missed[gap + 1]
-    variance = usual[track[gap]] * (variances[gap] + model.sensor.noise_sigma**2)
-    squared = ((d.points[one] - places[gap]) ** 2).sum(axis=1)
-    log_odds = (
-        _log_density(squared, JOLT**2 * variance, d.n_axes)
-        + _log_odds_of_detection(is_first, is_last, near)
-        - math.log(near.sensor.clutter_density)
-    )
-    matters = log_odds > MIN_LOG_ODDS - LEAD
-    return one[matters], track[gap][matters], log_odds[matters]
+    free = np.flatnonzero(is_free)
+    found = []
+    for gap, n in _pairs(np.flatnonzero(is_missed), frame, d.frame_of[free], d.n_frames):
+        one = free[n]
+        is_first, is_last = ~is_missed[gap - 1], ~is_missed[gap + 1]
+        variance = usual[track[gap]] * (variances[gap] + model.sensor.noise_sigma**2)
+        squared = ((d.points[one] - places[gap]) ** 2).sum(axis=1)
+        log_odds = (
+            _log_density(squared, JOLT**2 * variance, d.n_axes)
+            + _log_odds_of_detection(is_first, is_last, near)
+            - math.log(near.sensor.clutter_density)
+        )
+        matters = log_odds > MIN_LOG_ODDS - LEAD
+        found.append((one[matters], track[gap][matters], log_odds[matters]))
+    one, of, log_odds = (np.concatenate(each) for each in zip(*found, strict=True))
+    return one, of, log_odds
+
+
+def _pairs(
+    missed: NDArray[np.int64], frame: NDArray[np.int64], free: NDArray[np.int64], n_frames: int
+) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """Yield the states and the free detections of the same frame, some pairs at a time.
+
+    Parameters
+    ----------
+    missed : ndarray of int
+        States without a detection.
+    frame : ndarray of int, shape (M,)
+        Frame of each state.
+    free : ndarray of int
+        Frame of each free detection, in order.
+    n_frames : int
+        Number of frames.
+    """
+    ends = np.cumsum(np.bincount(free, minlength=n_frames))
+    n = np.diff(ends, prepend=0)[frame[missed]]
+    total = np.cumsum(n)
+    cuts = np.searchsorted(total, np.arange(PAIRS, total[-1] if len(n) else 0, PAIRS))
+    for some in np.split(np.arange(len(n)), cuts):
+        k = n[some]
+        last = np.repeat(ends[frame[missed[some]]] - np.cumsum(k), k)
+        yield np.repeat(missed[some], k), last + np.arange(len(last))
 
 
 def _usual_variance(
