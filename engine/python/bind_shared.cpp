@@ -10,6 +10,7 @@
 #include "python/arrays.hpp"
 #include "python/bindings.hpp"
 #include "python/motion_arrays.hpp"
+#include "rigid/marker_places.hpp"
 #include "rigid/shared_acceleration.hpp"
 
 using namespace nb::literals;
@@ -62,39 +63,6 @@ void make_shared_acceleration(SharedAcceleration* self, const In<std::int64_t>& 
   new (self) SharedAcceleration(static_cast<int>(own_shape.shape(1)), volume, std::move(markers));
 }
 
-// The detections of markers in frames. A marker with those of two tracks in a frame has none there.
-class MarkerPlaces {
- public:
-  MarkerPlaces(const TrackPoints& tracks, std::span<const std::int32_t> markers, std::size_t n_markers,
-               std::int64_t n_frames)
-      : n_frames_(n_frames), places_(n_markers * static_cast<std::size_t>(n_frames)) {
-    for (std::size_t k = 0; k < tracks.n_tracks(); ++k) {
-      if (markers[k] < 0) continue;
-      for (std::int64_t i = tracks.offsets[k]; i < tracks.offsets[k + 1]; ++i) {
-        Place& place = places_[index(markers[k], tracks.frames[i])];
-        place = {&tracks.points[i], place.n + 1};
-      }
-    }
-  }
-  const Point* operator()(std::int32_t marker, std::int64_t frame) const {
-    if (frame < 0) return nullptr;
-    const Place& place = places_[index(marker, frame)];
-    return place.n == 1 ? place.at : nullptr;
-  }
-
- private:
-  struct Place {
-    const Point* at = nullptr;
-    std::int32_t n = 0;
-  };
-  std::size_t index(std::int32_t marker, std::int64_t frame) const {
-    return static_cast<std::size_t>(marker * n_frames_ + frame);
-  }
-
-  std::int64_t n_frames_;
-  std::vector<Place> places_;
-};
-
 // The log densities (N, components) of the detections of tracks, and the predicted positions and
 // variances, (N, D + 1). Each track is of a marker, -1 for none, and those of no marker and those
 // that are not counted get NaN. The first detection of a track has no predicted position.
@@ -118,7 +86,11 @@ nb::tuple shared_densities(const SharedAcceleration& shared, const MotionModel& 
     std::fill_n(out.data.get(), tracks.points.size() * kShared, none);
     std::fill_n(predicted.data.get(), tracks.points.size() * (D + 1), none);
     const auto n_frames = static_cast<std::int64_t>(times.size());
-    const MarkerPlaces places(tracks, flat(markers), shared.size(), n_frames);
+    MarkerPlaces places;
+    places.begin(shared.size(), 0, n_frames);
+    for (std::size_t k = 0; k < tracks.n_tracks(); ++k)
+      for (std::int64_t i = tracks.offsets[k]; markers.data()[k] >= 0 && i < tracks.offsets[k + 1]; ++i)
+        places.add(markers.data()[k], tracks.frames[i], tracks.points[i]);
     SharedAcceleration::Mixture mixture;
     SharedAcceleration::Memory memory;
     for (std::size_t k = 0; k < tracks.n_tracks(); ++k) {

@@ -24,8 +24,9 @@
 
 namespace asterism {
 
+inline constexpr double kClose = 1e-4;  // standard deviations
+
 inline bool is_close(const AxisModel& m, const AxisState& a, const AxisState& b) {
-  constexpr double kClose = 1e-4;
   for (int i = 0; i < m.n; ++i) {
     const double variance = a.P[i * m.n + i];
     if (std::abs(b.P[i * m.n + i] - variance) > kClose * variance) return false;
@@ -203,7 +204,7 @@ class SeveralMotions {
   }
   static bool is_close(const MotionModel& m, const State& a, const State& b) {
     for (int k = 0; k < m.M; ++k)
-      if (std::abs(b.w[k] - a.w[k]) > 1e-4 || !asterism::is_close(m.axis, a.mode[k], b.mode[k]))
+      if (std::abs(b.w[k] - a.w[k]) > kClose || !asterism::is_close(m.axis, a.mode[k], b.mode[k]))
         return false;
     return true;
   }

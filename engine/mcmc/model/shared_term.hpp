@@ -18,7 +18,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -31,6 +30,7 @@
 #include "mcmc/model/edit_filter.hpp"
 #include "mcmc/model/edits.hpp"
 #include "mcmc/model/partition.hpp"
+#include "rigid/marker_places.hpp"
 #include "rigid/shared_acceleration.hpp"
 
 namespace asterism {
@@ -48,9 +48,7 @@ class SharedTerm {
     shared_ = whole.given()->shared.get();
     first_ = whole.window().first();
     n_frames_ = whole.window().now() - first_ + 1;
-    const std::size_t n_slots = shared_->size() * static_cast<std::size_t>(n_frames_);
-    slots_.resize(std::max(slots_.size(), n_slots));
-    for (std::size_t s = 0; s < n_slots; ++s) slots_[s].clear();
+    places_.begin(shared_->size(), first_, n_frames_);
     outside_.resize(std::max(outside_.size(), shared_->size()));
     for (std::vector<std::int32_t>& of : outside_) of.clear();
     is_inside_.assign(is_inside_.size(), 0);
@@ -63,12 +61,12 @@ class SharedTerm {
     if (!is_on_) return;
     known_inside_.assign(part.window().n_ids(), kUnknown);
     known_outside_.assign(whole.window().n_ids(), kUnknown);
-    for (const FixedPlace& one : whole.fixed()) slot(one.marker, one.frame).push_back(one.at);
+    for (const FixedPlace& one : whole.fixed()) places_.add(one.marker, one.frame, one.at);
     for (const std::int32_t k : whole.tracks().items()) {
       const std::int32_t marker = whole.marker(k);
       if (marker < 0) continue;
       for (const std::int32_t i : whole.track(k).nodes)
-        slot(marker, whole.window()[i].frame).push_back(whole.window()[i].y);
+        places_.add(marker, whole.window()[i].frame, whole.window()[i].y);
       const auto at = static_cast<std::size_t>(k);
       if (at >= is_inside_.size() || !is_inside_[at]) outside_[marker].push_back(k);
     }
@@ -139,21 +137,6 @@ class SharedTerm {
     auto operator<=>(const Node&) const = default;
   };
 
-  std::vector<Point>& slot(std::int32_t marker, std::int64_t frame) {
-    return slots_[static_cast<std::size_t>(marker) * static_cast<std::size_t>(n_frames_) +
-                  static_cast<std::size_t>(frame - first_)];
-  }
-  const Point* place(std::int32_t marker, std::int64_t frame) {
-    if (frame < first_) return nullptr;
-    const std::vector<Point>& at = slot(marker, frame);
-    return at.size() == 1 ? &at.front() : nullptr;
-  }
-  static void remove(std::vector<Point>& at, const Point& y) {
-    const auto found = std::ranges::find(at, y);
-    assert(found != at.end());
-    *found = at.back();
-    at.pop_back();
-  }
   // The marker of an edited track after the edit.
   std::int32_t new_marker(const Edit<Filter>& edit) const {
     if (edit.keep > 0) {
@@ -201,12 +184,11 @@ class SharedTerm {
   // Moves the places of markers to those after the listed changes, and back.
   void move_places(bool is_back = false) {
     for (const Changed& one : changed_) {
-      std::vector<Point>& at = slot(one.marker, one.frame);
       const Point& y = part_->window()[one.detection].y;
       if (one.is_new != is_back)
-        at.push_back(y);
+        places_.add(one.marker, one.frame, y);
       else
-        remove(at, y);
+        places_.remove(one.marker, one.frame, y);
     }
   }
 
@@ -274,8 +256,8 @@ class SharedTerm {
     std::size_t n_pairs = 0, n_shape = 0;
     for (const auto& other : (*shared_)[marker].before) {
       if (other.marker == neighbour) return true;
-      if (place(other.marker, to) == nullptr) continue;
-      n_pairs += place(other.marker, from) != nullptr;
+      if (places_(other.marker, to) == nullptr) continue;
+      n_pairs += places_(other.marker, from) != nullptr;
       n_shape += !std::isnan(other.shape[0]);
       if (std::min(n_pairs, n_shape) >= kSteadiest) return false;
     }
@@ -372,9 +354,7 @@ class SharedTerm {
     const auto& at = p.window()[j];
     return shared_->begin_gain(
         marker, shared_->begin_densities(
-                    marker, at.frame, at.y, p.motion().axis.r,
-                    [&](std::int32_t other, std::int64_t frame) { return place(other, frame); },
-                    memory_));
+                    marker, at.frame, at.y, p.motion().axis.r, places_, memory_));
   }
   // The term of detection j after detection i, which follows `n_before` - 1 others of its track and
   // has this filter state.
@@ -385,11 +365,9 @@ class SharedTerm {
     const auto &from = window[i], &to = window[j];
     const auto gap = static_cast<int>(to.frame - from.frame);
     p.filter().expect(p.motion(), window, state, from.frame, gap, expected_);
-    shared_->predict(
-        Filter::own_prediction(p.motion(), expected_),
-        {marker, from.frame, to.frame, from.y, to.y, n_before > 1},
-        [&](std::int32_t other, std::int64_t frame) { return place(other, frame); }, memory_,
-        mixture_);
+    shared_->predict(Filter::own_prediction(p.motion(), expected_),
+                     {marker, from.frame, to.frame, from.y, to.y, n_before > 1}, places_, memory_,
+                     mixture_);
     return shared_->gain(marker, shared_->densities(mixture_, to.y));
   }
 
@@ -397,7 +375,7 @@ class SharedTerm {
   const SharedAcceleration* shared_ = nullptr;
   bool is_on_ = false;
   std::int64_t first_ = 0, n_frames_ = 0;
-  std::vector<std::vector<Point>> slots_;           // detections by marker and frame
+  MarkerPlaces places_;
   std::vector<std::vector<std::int32_t>> outside_;  // tracks of the whole partition by marker
   std::vector<std::vector<Node>> inside_;           // kept parts of the tracks of the part by marker
   std::vector<char> is_inside_, is_changed_, is_near_changed_;  // tracks, and frames

@@ -39,8 +39,7 @@ def log_posterior(
     shared : SharedAcceleration, optional
         Shared accelerations; by default there are none.
     """
-    is_counted = None if shared is None else np.ones(len(shared.weights), dtype=bool)
-    return _log_posterior(tracks, model, shared, is_counted)
+    return _log_posterior(tracks, model, shared)
 
 
 def gain_of_change(
@@ -81,17 +80,18 @@ def _log_posterior(
     tracks: Tracks,
     model: TrackingModel,
     shared: SharedAcceleration | None,
-    is_counted: NDArray[np.bool_] | None,
+    is_counted: NDArray[np.bool_] | None = None,
 ) -> float:
-    """Return the log posterior of tracks, with the gains of some markers."""
+    """Return the log posterior of tracks, with the gains of some markers, or of all."""
     pieces = within_limits(tracks, model)
     scores = track_scores(pieces, model)
     own = float(scores[np.isfinite(scores)].sum())
-    if shared is None or is_counted is None:
+    if shared is None:
         return own
     order, offsets = pieces.by_track
     of = tracks.labels[order[offsets[:-1]]]
-    return own + float(shared_gains(pieces, model, shared, of, is_counted[of]).sum())
+    counted = None if is_counted is None else is_counted[of]
+    return own + float(shared_gains(pieces, model, shared, of, counted).sum())
 
 
 def within_limits(tracks: Tracks, model: TrackingModel) -> Tracks:
