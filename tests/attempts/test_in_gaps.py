@@ -116,6 +116,34 @@ def test_the_usual_error_is_that_against_the_position_smoothed_from_all_other_de
         expected += (off**2).mean() / (P + r)
     found = in_gaps._usual_variance(np.zeros(40, dtype=int), error, variance, r, 2)
     assert found == pytest.approx([(expected + 20) / 60, 1])
+    # Of a position that is smoothed almost from this detection alone, the error is not known.
+    hardly = in_gaps._usual_variance(np.zeros(40, dtype=int), error, np.full(40, 0.95 * r), r, 2)
+    assert hardly.tolist() == [1, 1]
+
+
+@pytest.mark.parametrize("length", [1, 3])
+def test_log_odds_contain_those_of_a_detection_in_its_frame_of_the_gap(length):
+    sensor = dataclasses.replace(MODEL.sensor, p_detection=0.9, p_redetection=0.3)
+    changed = dataclasses.replace(MODEL, sensor=sensor)
+    gone = FIRST + N * np.arange(length)
+    for n in range(length):
+        labels, points = TRUTH.labels.copy(), TRUTH.detections.points.copy()
+        labels[gone] = -1
+        points[np.delete(gone, n)] += 5
+        before = stitched(labels, points)
+        at = np.array([n == 0]), np.array([n == length - 1])
+        odds = [in_gaps._clear(before, model) for model in (MODEL, changed)]
+        assert [each[0].tolist() for each in odds] == [[gone[n]]] * 2
+        prior = [_log_odds_of_detection(*at, model) for model in (MODEL, changed)]
+        assert odds[1][2] - odds[0][2] == pytest.approx(prior[1] - prior[0])
+
+
+def test_a_detection_needs_a_lead_over_one_that_is_not_probable_enough_itself():
+    some = np.linspace(0.05, 0.1, 101)
+    most = max(x for x in some if len(in_gaps._clear(missed([0, x, 0]), MODEL)[0]))
+    near, far = [0, 0.99 * most, 0], [0, -1.02 * most, 0]
+    taken = [len(in_gaps._clear(missed(*each), MODEL)[0]) for each in ([near], [far], [near, far])]
+    assert taken == [1, 0, 0]
 
 
 def test_detections_of_ghosts_are_not_taken():

@@ -131,7 +131,7 @@ class SharedAcceleration:
         )  # fmt: skip
 
     def concerned(self, markers: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Return which markers have gains that depend on the detections of some of them.
+        """Return the markers whose gains depend on the detections of some markers.
 
         Parameters
         ----------

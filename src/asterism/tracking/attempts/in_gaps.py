@@ -31,8 +31,8 @@ MIN_LOG_ODDS = 6.0
 LEAD = 3.0
 """Log odds by which it must exceed those of others for the gap, and of other gaps for it."""
 MAX_SHARE = 0.9
-"""Largest variance of a smoothed position, in those of the sensor, with which the error of a
-detection is measured: then it is not smoothed from this detection alone."""
+"""Largest variance of a smoothed position, in variances of the sensor, with which the error of a
+detection counts. Beyond, the position is smoothed almost from this detection alone."""
 N_PRIOR = 20
 """Number of detections with the expected error that count besides those of a track."""
 BLOCK = 2_000_000
@@ -196,7 +196,7 @@ def _usual_variance(
     noise: float,
     n_tracks: int,
 ) -> NDArray[np.float64]:
-    """Return for each track the mean squared error of its detections, in the variances expected.
+    """Return the mean squared error of the detections of each track, relative to that expected.
 
     The error is that against the position smoothed from all others. From the one smoothed from all,
     with the variance P where that of the sensor is r, it follows as error / (1 - P / r), with the

@@ -50,7 +50,7 @@ def gain_of_change(
     model: TrackingModel,
     shared: SharedAcceleration,
 ) -> float:
-    """Return the change of the log posterior of tracks with other labels for some detections.
+    """Return by how much the log posterior rises if some detections get other labels.
 
     Parameters
     ----------
